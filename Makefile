@@ -1,0 +1,57 @@
+# `make demo` and `make test` need only Rust, git and a C compiler: tools/setup installs the rest.
+
+# rustup's own folder, for shells that have not read its settings yet.
+export PATH := $(PATH):$(HOME)/.cargo/bin
+
+# What conda installed is found by pkg-config, and by the program when it runs, only when told where it is.
+# This is looked up anew for each command, since tools/setup may have just installed it.
+ifdef CONDA_PREFIX
+export PKG_CONFIG_PATH := $(if $(PKG_CONFIG_PATH),$(PKG_CONFIG_PATH):)$(CONDA_PREFIX)/lib/pkgconfig
+export RUSTFLAGS += $(shell [ ! -e '$(CONDA_PREFIX)/lib/pkgconfig/cfitsio.pc' ] || echo '-Clink-arg=-Wl,-rpath,$(CONDA_PREFIX)/lib')
+endif
+
+# The folder that `make demo` writes, and flags for every cargo command that resolves packages, such as --locked.
+DEMO = demo
+CARGOFLAGS =
+
+.PHONY: help demo test check licences bench install clean setup
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile
+
+demo: setup ## build longan and write its demonstration into demo/
+	cargo run --release --bin longan $(CARGOFLAGS) -- demo $(DEMO) --overwrite
+
+# The tests come last, so that what the run ends with is their own summary.
+test: check ## run every check and test
+	python=$$(tools/setup python) && env $${python:+LONGAN_PYTHON="$$python"} \
+	cargo test --workspace --no-fail-fast $(CARGOFLAGS)
+
+# clippy and doc share one compilation of the dependencies, the tests' build is the second and last.
+check: setup licences ## check the format, the lints, the documentation and the licences
+	tools/setup lints
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets $(CARGOFLAGS) -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGOFLAGS)
+
+# Refused are a dependency that names no licence and one whose every choice is of the GPL family. An AND beside
+# a GPL may nest in ways that a person has to read, so it is refused too.
+licences: ## check that no dependency forces a GPL licence on longan
+	@tree=$$(cargo tree --workspace --all-features --edges normal --prefix none --format '{l}|{p}' $(CARGOFLAGS)) && \
+	echo "$$tree" | awk -F'|' ' \
+		NF { free = 0; split($$1, choices, / OR |\//); for (i in choices) if (choices[i] !~ /GPL/) free = 1 } \
+		NF && (!free || $$1 ~ /GPL.* AND | AND .*GPL/) { print "licence refused: " $$2 " has \"" $$1 "\""; bad = 1 } \
+		END { exit bad }'
+
+bench: setup ## compare longan's speed with that of its peers
+	cargo bench --bench peers $(CARGOFLAGS)
+
+install: setup ## install longan with cargo
+	cargo install --path . --locked
+
+clean: ## remove what was built
+	cargo clean
+	rm -rf $(DEMO)
+
+setup:
+	@tools/setup
