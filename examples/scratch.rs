@@ -14,16 +14,14 @@ fn main() {
     let sel = Selection { area: true, length: true, curvature: true, ranks: (1..=8).collect(), weight: Weight::Length };
     let t0 = std::time::Instant::now();
     let field = Field::new(grid, &values, &t, Body::Above);
-    let w = windows(&field, &sel, out, radius, |m| m.clone(), |_| {});
+    let w = windows(&field, &sel, out, radius, 20, |m, o| { o[0]=m.masked_fraction; o[1]=m.area; o[2]=m.length; o[3]=m.curvature; for (i,p) in m.psi.iter().enumerate() { o[4+2*i]=p.re; o[5+2*i]=p.im; } }, |_| {});
     println!("all: {:?}", t0.elapsed());
     let rows: Vec<Vec<f64>> = csv.lines().filter(|l| !l.starts_with('#')).skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
     let names: Vec<&str> = csv.lines().find(|l| l.starts_with("pixel")).unwrap().split(',').collect();
-    assert_eq!(rows.len(), w.len());
+    assert_eq!(rows.len(), w[0].len());
     for c in 1..21 {
         let max = rows.iter().map(|r| r[c].abs()).fold(0.0, f64::max);
-        let err = rows.iter().zip(&w).map(|(r, m)| {
-            let v = match c { 1 => m.masked_fraction, 2 => m.area, 3 => m.length, 4 => m.curvature, c if c % 2 == 1 => m.psi[(c - 5) / 2].re, c => m.psi[(c - 6) / 2].im };
-            (v - r[c]).abs() }).fold(0.0, f64::max);
+        let err = rows.iter().zip(&w[c-1]).map(|(r, v)| (v - r[c]).abs()).fold(0.0, f64::max);
         println!("{} {:e} {:e}", names[c], err, err / max);
     }
     let (tot, masked) = totals(&field);
@@ -36,7 +34,7 @@ fn main() {
     let t0 = std::time::Instant::now();
     let field = Field::new(grid, &values, &t, Body::Above);
     println!("bins: {:?}", t0.elapsed());
-    let w = windows(&field, &sel, out, radius, |m| m.length, |_| {});
-    println!("evq: {:?} {}", t0.elapsed(), w[0]);
+    let w = windows(&field, &sel, out, radius, 1, |m, o| o[0] = m.length, |_| {});
+    println!("evq: {:?} {}", t0.elapsed(), w[0][0]);
     }}
 }

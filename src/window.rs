@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::cells;
 use crate::contour::Field;
-use crate::moments::{self, Layout, RingMoments, Selection, Weight};
+use crate::moments::{self, Layout, RingMoments, Selection};
 use crate::transport::{Phases, Powers, RingTransport};
 
 /// Rings of input moments that are made at a time, at least.
@@ -23,7 +23,7 @@ const BAND: usize = 128;
 const BLOCK: usize = 32;
 
 /// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Moments {
     /// Colatitude and longitude of the window's centre in radians.
     pub centre: (f64, f64),
@@ -37,29 +37,28 @@ pub struct Moments {
     pub curvature: f64,
     /// ψ_s for the ranks selected.
     pub psi: Vec<Complex64>,
-    /// The weight of ψ_s.
-    pub weight: Weight,
 }
 
 /// Visits the windows of radius `radius` (radians; 0: the input pixel itself) about all pixels of `output`.
 ///
-/// Returns what `visit` makes of each, in RING order, as `visit`'s arrays put one after the other. `progress` is told
-/// the share done, from 0 to 1. Results do not depend on the number of threads.
+/// `visit` fills `columns` numbers for each; they are returned column by column, in RING order. `progress` is told the
+/// share done, from 0 to 1. The result does not depend on the number of threads.
 ///
 /// # Panics
 /// For radius 0 if the output grid is not the input's.
-pub fn windows<T: Send>(
+pub fn windows(
     field: &Field<'_>,
     selection: &Selection,
     output: Healpix,
     radius: f64,
-    visit: impl Fn(&Moments) -> T + Sync,
+    columns: usize,
+    visit: impl Fn(&Moments, &mut [f64]) + Sync,
     mut progress: impl FnMut(f64),
-) -> Vec<T> {
+) -> Vec<Vec<f64>> {
     assert!(radius > 0.0 || output == field.grid(), "a window of one pixel needs the input's grid");
     let layout = Layout::new(selection, field.has_masked());
     let input = field.grid();
-    let mut out = Vec::with_capacity(output.pixels());
+    let mut out = vec![Vec::with_capacity(output.pixels()); columns];
     let mut band = Band { first: 1, rings: VecDeque::new() };
     let mut next = 1;
     while next <= output.rings() {
@@ -73,15 +72,20 @@ pub fn windows<T: Send>(
         }
         next += 1;
         band.advance(field, &layout, reach);
-        let rings: Vec<Vec<T>> = (4 * first..4 * next)
+        let quadrants: Vec<Vec<f64>> = (4 * first..4 * next)
             .into_par_iter()
             .map(|i| {
                 let ring = OutputRing::new(input, output, i / 4, radius);
-                ring.quadrant(i % 4, &band, &layout, field.thresholds(), &visit)
+                ring.quadrant(i % 4, &band, &layout, field.thresholds(), columns, &visit)
             })
             .collect();
-        rings.into_iter().for_each(|r| out.extend(r));
-        progress(out.len() as f64 / output.pixels() as f64);
+        for quadrant in &quadrants {
+            for (column, out) in out.iter_mut().enumerate() {
+                out.extend(quadrant.iter().skip(column).step_by(columns));
+            }
+        }
+        let done = output.ring(next - 1);
+        progress((done.start + done.len) as f64 / output.pixels() as f64);
     }
     out
 }
@@ -187,55 +191,53 @@ impl OutputRing {
 
     /// Windows about the pixels of one quadrant of the ring. Longitudes are counted from the quadrant's own meridian,
     /// so that a field turned by 90° gives the same windows to the last bit.
-    fn quadrant<T>(
+    fn quadrant(
         &self,
         quadrant: usize,
         band: &Band,
         layout: &Layout,
         thresholds: usize,
-        visit: impl Fn(&Moments) -> T,
-    ) -> Vec<T> {
+        columns: usize,
+        visit: impl Fn(&Moments, &mut [f64]),
+    ) -> Vec<f64> {
         let ring = self.output.ring(self.ring);
         let in_quadrant = ring.len / 4;
+        let mut out = vec![0.0; in_quadrant * columns];
         let mut sums = vec![0.0; layout.rows];
-        (0..in_quadrant)
-            .map(|k| {
-                sums.fill(0.0);
-                let mut shares = 0;
-                let phi = ring.phi(k as isize);
-                let column = quadrant * in_quadrant + k;
-                if self.reached.is_empty() {
-                    shares += self.shares(self.ring, column..column + 1);
-                    for (row, sum) in sums.iter_mut().enumerate() {
-                        *sum = band.ring(self.ring).row(row)[column];
-                    }
+        let mut moments = Moments::default();
+        for (k, out) in out.chunks_exact_mut(columns).enumerate() {
+            sums.fill(0.0);
+            let mut shares = 0;
+            let phi = ring.phi(k as isize);
+            let column = quadrant * in_quadrant + k;
+            if self.reached.is_empty() {
+                shares += self.shares(self.ring, column..column + 1);
+                for (row, sum) in sums.iter_mut().enumerate() {
+                    *sum = band.ring(self.ring).row(row)[column];
                 }
-                for reached in &self.reached {
-                    for (columns, dphi) in reached.columns(phi, quadrant) {
-                        shares += self.shares(reached.ring, columns.clone());
-                        add(band.ring(reached.ring), layout, columns, dphi, reached, &mut sums);
-                    }
+            }
+            for reached in &self.reached {
+                for (columns, dphi) in reached.columns(phi, quadrant) {
+                    shares += self.shares(reached.ring, columns.clone());
+                    add(band.ring(reached.ring), layout, columns, dphi, reached, &mut sums);
                 }
-                let mean = |row: usize| sums[row] / thresholds as f64;
-                let optional = |row: Option<usize>| row.map_or(0.0, mean);
-                visit(&Moments {
-                    centre: (ring.theta(), ring.phi(column as isize)),
-                    masked_fraction: match (shares, layout.masked) {
-                        (0, _) => 1.0,
-                        (_, Some(row)) => sums[row] / shares as f64,
-                        (_, None) => 0.0,
-                    },
-                    area: optional(layout.area),
-                    length: optional(layout.length),
-                    curvature: optional(layout.curvature),
-                    psi: (0..layout.ranks.len())
-                        .map(|r| layout.first_rank + 2 * r)
-                        .map(|row| Complex64::new(mean(row), mean(row + 1)))
-                        .collect(),
-                    weight: layout.weight,
-                })
-            })
-            .collect()
+            }
+            moments.centre = (ring.theta(), ring.phi(column as isize));
+            moments.masked_fraction = match (shares, layout.masked) {
+                (0, _) => 1.0,
+                (_, Some(row)) => sums[row] / shares as f64,
+                (_, None) => 0.0,
+            };
+            sums.iter_mut().for_each(|sum| *sum /= thresholds as f64);
+            let selected = |row: Option<usize>| row.map_or(0.0, |row| sums[row]);
+            moments.area = selected(layout.area);
+            moments.length = selected(layout.length);
+            moments.curvature = selected(layout.curvature);
+            moments.psi.clear();
+            moments.psi.extend(sums[layout.first_rank..].chunks_exact(2).map(|p| Complex64::new(p[0], p[1])));
+            visit(&moments, out);
+        }
+        out
     }
 
     /// Cell shares of these pixels, in twelfths of a cell.
