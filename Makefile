@@ -29,7 +29,7 @@ test: check ## run every check and test
 
 # clippy and doc share one compilation of the dependencies, the tests' build is the second and last.
 check: setup licences ## check the format, the lints, the documentation and the licences
-	tools/setup lints
+	@tools/setup lints
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets $(CARGOFLAGS) -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGOFLAGS)
