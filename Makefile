@@ -17,7 +17,7 @@ CARGOFLAGS =
 .PHONY: help demo test check licences bench install clean setup
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile
+	@awk -F':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: setup ## build longan and write its demonstration into demo/
 	cargo run --release --bin longan $(CARGOFLAGS) -- demo $(DEMO) --overwrite
