@@ -17,7 +17,7 @@ CARGOFLAGS =
 .PHONY: help demo test check licences bench install clean setup
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile
+	@awk -F':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: setup ## build longan and write its demonstration into demo/
 	cargo run --release --bin longan $(CARGOFLAGS) -- demo $(DEMO) --overwrite
@@ -29,7 +29,7 @@ test: check ## run every check and test
 
 # clippy and doc share one compilation of the dependencies, the tests' build is the second and last.
 check: setup licences ## check the format, the lints, the documentation and the licences
-	tools/setup lints
+	@tools/setup lints
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets $(CARGOFLAGS) -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGOFLAGS)

@@ -72,6 +72,12 @@ impl Map {
         Ok(Map { grid, values, name: name.into(), unit: None, coordinates: None, ordering: Ordering::Ring })
     }
 
+    /// A map of values in RING order in which nothing but NaN means "no value"; one value for each pixel.
+    pub(crate) fn from_masked(grid: Healpix, values: Vec<f64>) -> Self {
+        debug_assert_eq!(values.len(), grid.pixels());
+        Map { grid, values, name: String::new(), unit: None, coordinates: None, ordering: Ordering::Ring }
+    }
+
     /// The grid.
     pub fn grid(&self) -> Healpix {
         self.grid

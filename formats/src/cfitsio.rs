@@ -1,0 +1,433 @@
+//! The edge to cfitsio: files, HDUs, keywords and columns, safely.
+//!
+//! All `unsafe` of this crate is here. What the keywords and columns mean is left to others.
+//!
+//! cfitsio gives file names a syntax of its own (`map.fits[1]`, `map.fits(copy)`, `!map.fits`, `~user`). Users' paths
+//! must not be subject to it, hence the "diskfile" functions and the care of [`c_path`]; compressed data come from
+//! memory, because cfitsio chooses the decompressor by the path.
+
+use std::ffi::{CString, c_char, c_int, c_long, c_void};
+use std::path::Path;
+use std::ptr;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use fitsio::sys;
+
+use crate::Error;
+
+/// An open FITS file.
+pub(crate) struct Fits {
+    handle: *mut sys::fitsfile,
+    /// Size in bytes, uncompressed.
+    size: u64,
+    /// The bytes, where the file is in memory; freed after the handle is closed.
+    _memory: Option<Box<Memory>>,
+}
+
+/// A file in memory, and the addresses that cfitsio keeps of it.
+struct Memory {
+    _bytes: Vec<u8>,
+    start: *mut c_void,
+    len: usize,
+}
+
+/// The kinds of HDU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum HduKind {
+    /// An image, perhaps an empty one.
+    Image,
+    /// A table of text.
+    TextTable,
+    /// A binary table.
+    Table,
+}
+
+/// Where an HDU lies in its file, in bytes from the beginning.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    /// Begin of the header.
+    pub(crate) header: i64,
+    /// Begin of the data.
+    pub(crate) data: i64,
+    /// End of the data, padding included.
+    pub(crate) end: i64,
+}
+
+/// The longest path that fits into cfitsio's buffers with all that it appends there.
+const PATH_MAX: usize = 1000;
+
+/// cfitsio's status for a keyword that is not there.
+const KEY_NO_EXIST: c_int = 202;
+
+/// Keeps other threads out of a cfitsio that was not compiled for them.
+fn guard() -> Option<MutexGuard<'static, ()>> {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    // SAFETY: takes nothing and returns a constant.
+    let reentrant = unsafe { sys::fits_is_reentrant() } != 0;
+    (!reentrant).then(|| ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Calls cfitsio and makes its status a `Result`.
+fn call(action: &'static str, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
+    let _guard = guard();
+    let mut status = 0;
+    function(&mut status);
+    if status == 0 {
+        return Ok(());
+    }
+    let mut text = [0 as c_char; sys::FLEN_ERRMSG as usize];
+    // SAFETY: the buffer has the length that cfitsio documents (FLEN_STATUS) and more.
+    unsafe { sys::ffgerr(status, text.as_mut_ptr()) };
+    Err(Error::Cfitsio { action, status, message: from_c(&text) })
+}
+
+/// The text in a buffer up to its NUL, FITS's padding removed.
+fn from_c(buffer: &[c_char]) -> String {
+    let bytes: Vec<u8> = buffer.iter().map(|&c| c as u8).take_while(|&b| b != 0).collect();
+    String::from_utf8_lossy(&bytes).trim_end().to_owned()
+}
+
+/// A path as cfitsio takes it literally.
+///
+/// Even the diskfile functions skip leading spaces and expand a leading `~` (crashing on an unknown user), so a relative
+/// path gets a `./` in front.
+fn c_path(path: &Path) -> Result<CString, Error> {
+    let path = if path.is_absolute() { path.to_owned() } else { Path::new(".").join(path) };
+    let bytes = path.into_os_string().into_encoded_bytes();
+    if bytes.len() > PATH_MAX {
+        return Err(Error::PathTooLong { bytes: bytes.len(), limit: PATH_MAX });
+    }
+    CString::new(bytes).map_err(|_| Error::PathNul)
+}
+
+/// Text for cfitsio; callers have made it printable ASCII.
+fn c_text(text: &str) -> CString {
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
+}
+
+impl Fits {
+    /// Opens an uncompressed file.
+    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+        // cfitsio would go on to try `path.gz` and others.
+        let size = std::fs::metadata(path).map_err(Error::io("open it"))?.len();
+        let name = c_path(path)?;
+        let mut handle = ptr::null_mut();
+        // SAFETY: `name` is a C string and `handle` a place for the result, both valid during the call.
+        call("open it", |status| unsafe {
+            sys::ffdkopn(&mut handle, name.as_ptr(), 0, status);
+        })?;
+        Ok(Fits { handle, size, _memory: None })
+    }
+
+    /// Opens an uncompressed file that is in memory.
+    pub(crate) fn open_memory(mut bytes: Vec<u8>) -> Result<Self, Error> {
+        let (start, len) = (bytes.as_mut_ptr().cast(), bytes.len());
+        let mut memory = Box::new(Memory { _bytes: bytes, start, len });
+        let mut handle = ptr::null_mut();
+        // SAFETY: cfitsio keeps the addresses of `start` and `len`, which are boxed and outlive the handle, as do the
+        // bytes. It opens them for reading only (mode 0), so it neither writes to nor reallocates them.
+        call("open it", |status| unsafe {
+            sys::ffomem(&mut handle, c"longan".as_ptr(), 0, &mut memory.start, &mut memory.len, 0, None, status);
+        })?;
+        Ok(Fits { handle, size: len as u64, _memory: Some(memory) })
+    }
+
+    /// Creates a file, which must not exist.
+    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
+        let name = c_path(path)?;
+        let mut handle = ptr::null_mut();
+        // SAFETY: as in `open`.
+        call("create it", |status| unsafe {
+            sys::ffdkinit(&mut handle, name.as_ptr(), status);
+        })?;
+        Ok(Fits { handle, size: 0, _memory: None })
+    }
+
+    /// Closes the file; where it was written, this writes what is left.
+    pub(crate) fn close(mut self) -> Result<(), Error> {
+        let handle = std::mem::replace(&mut self.handle, ptr::null_mut());
+        // SAFETY: `handle` is open, and no longer in `self`, so it is closed once.
+        call("finish it", |status| unsafe {
+            sys::ffclos(handle, status);
+        })
+    }
+
+    /// Size in bytes, uncompressed; 0 for a new file.
+    pub(crate) fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Makes an HDU (0 for the primary one) the current one.
+    pub(crate) fn go(&mut self, hdu: usize) -> Result<HduKind, Error> {
+        let mut kind = 0;
+        let number = c_int::try_from(hdu + 1).unwrap_or(c_int::MAX);
+        // SAFETY: the handle is open; `kind` outlives the call.
+        call("read the header of the next HDU", |status| unsafe {
+            sys::ffmahd(self.handle, number, &mut kind, status);
+        })?;
+        Ok(match kind {
+            1 => HduKind::TextTable,
+            2 => HduKind::Table,
+            _ => HduKind::Image,
+        })
+    }
+
+    /// Where the current HDU lies.
+    pub(crate) fn extent(&mut self) -> Result<Extent, Error> {
+        let (mut header, mut data, mut end) = (0, 0, 0);
+        // SAFETY: the handle is open; the results outlive the call.
+        call("find the data", |status| unsafe {
+            sys::ffghadll(self.handle, &mut header, &mut data, &mut end, status);
+        })?;
+        Ok(Extent { header, data, end })
+    }
+
+    /// The value of a keyword of the current HDU as it is written there: text with its quotes, numbers as digits.
+    pub(crate) fn key(&mut self, key: &str) -> Result<Option<String>, Error> {
+        let name = c_text(key);
+        let mut value = [0 as c_char; sys::FLEN_VALUE as usize];
+        let mut comment = [0 as c_char; sys::FLEN_COMMENT as usize];
+        // SAFETY: the handle is open; the buffers have the documented lengths.
+        let found = call("read a keyword", |status| unsafe {
+            sys::ffgkey(self.handle, name.as_ptr(), value.as_mut_ptr(), comment.as_mut_ptr(), status);
+        });
+        match found {
+            Ok(()) => Ok(Some(from_c(&value))),
+            Err(Error::Cfitsio { status: KEY_NO_EXIST, .. }) => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Number of columns of the current table.
+    pub(crate) fn columns(&mut self) -> Result<c_int, Error> {
+        let mut columns = 0;
+        // SAFETY: the handle is open; `columns` outlives the call.
+        call("count the columns", |status| unsafe {
+            sys::ffgncl(self.handle, &mut columns, status);
+        })?;
+        Ok(columns)
+    }
+
+    /// Type code (negative for variable length), repeat count and width in bytes of a column, counted from 1.
+    pub(crate) fn column_type(&mut self, column: c_int) -> Result<(c_int, i64, i64), Error> {
+        let (mut code, mut repeat, mut width) = (0, 0, 0);
+        // SAFETY: the handle is open; the results outlive the call.
+        call("read the type of a column", |status| unsafe {
+            sys::ffgtclll(self.handle, column, &mut code, &mut repeat, &mut width, status);
+        })?;
+        Ok((code, repeat, width))
+    }
+
+    /// Sets the scaling of a column, in place of TSCAL and TZERO.
+    pub(crate) fn set_scaling(&mut self, column: c_int, scale: f64, zero: f64) -> Result<(), Error> {
+        // SAFETY: the handle is open.
+        call("scale a column", |status| unsafe {
+            sys::fftscl(self.handle, column, scale, zero, status);
+        })
+    }
+
+    /// Reads numbers of a column from row `row` and element `element` in it, both counted from 0, running on into
+    /// the next rows. TSCAL and TZERO are applied; with `nulls`, values equal to TNULL become NaN.
+    pub(crate) fn read_f64(
+        &mut self,
+        column: c_int,
+        (row, element): (usize, usize),
+        nulls: bool,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        // To cfitsio, 0 means not to look for nulls.
+        let null = if nulls { f64::NAN } else { 0.0 };
+        // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails.
+        call("read a column", |status| unsafe {
+            sys::ffgcvd(
+                self.handle,
+                column,
+                row as i64 + 1,
+                element as i64 + 1,
+                out.len() as i64,
+                null,
+                out.as_mut_ptr(),
+                ptr::null_mut(),
+                status,
+            );
+        })
+    }
+
+    /// Reads integers likewise, without looking for nulls.
+    pub(crate) fn read_i64(
+        &mut self,
+        column: c_int,
+        (row, element): (usize, usize),
+        out: &mut [i64],
+    ) -> Result<(), Error> {
+        // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails.
+        call("read a column of integers", |status| unsafe {
+            sys::ffgcvjj(
+                self.handle,
+                column,
+                row as i64 + 1,
+                element as i64 + 1,
+                out.len() as i64,
+                0,
+                out.as_mut_ptr(),
+                ptr::null_mut(),
+                status,
+            );
+        })
+    }
+
+    /// Reads truth values likewise: 1 true, 0 false, anything else neither.
+    pub(crate) fn read_logical(
+        &mut self,
+        column: c_int,
+        (row, element): (usize, usize),
+        out: &mut [u8],
+    ) -> Result<(), Error> {
+        let mut nulls = vec![0 as c_char; out.len()];
+        let mut any = 0;
+        // SAFETY: the handle is open; cfitsio writes `out.len()` elements to each of the two arrays or fails.
+        call("read a column of truth values", |status| unsafe {
+            sys::ffgcfl(
+                self.handle,
+                column,
+                row as i64 + 1,
+                element as i64 + 1,
+                out.len() as i64,
+                out.as_mut_ptr().cast(),
+                nulls.as_mut_ptr(),
+                &mut any,
+                status,
+            );
+        })?;
+        for (value, null) in out.iter_mut().zip(nulls) {
+            if null != 0 {
+                *value = u8::MAX;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes an empty primary HDU.
+    pub(crate) fn write_primary(&mut self) -> Result<(), Error> {
+        let mut axes: [c_long; 1] = [0];
+        // SAFETY: the handle is open for writing; no axis is read where their number is 0.
+        call("write the primary header", |status| unsafe {
+            sys::ffcrim(self.handle, 8, 0, axes.as_mut_ptr(), status);
+        })
+    }
+
+    /// Appends a binary table; each column is its name, type (TFORM) and unit.
+    pub(crate) fn write_table(&mut self, name: &str, rows: usize, columns: &[[&str; 3]]) -> Result<(), Error> {
+        let texts: Vec<[CString; 3]> = columns.iter().map(|column| column.map(c_text)).collect();
+        let mut pointers = [0, 1, 2].map(|i| texts.iter().map(|t| t[i].as_ptr().cast_mut()).collect::<Vec<_>>());
+        let [names, types, units] = &mut pointers;
+        let name = c_text(name);
+        // SAFETY: the handle is open for writing; each array has as many C strings as there are columns, which
+        // cfitsio reads during the call only.
+        call("write the header of a table", |status| unsafe {
+            sys::ffcrtb(
+                self.handle,
+                2,
+                rows as i64,
+                columns.len() as c_int,
+                names.as_mut_ptr(),
+                types.as_mut_ptr(),
+                units.as_mut_ptr(),
+                name.as_ptr(),
+                status,
+            );
+        })
+    }
+
+    /// Appends a header entry whose value is written as given: digits, T or F.
+    pub(crate) fn write_key(&mut self, key: &str, value: &str, comment: &str) -> Result<(), Error> {
+        let (key, comment) = (c_text(key), c_text(comment));
+        let mut value = c_text(value).into_bytes_with_nul();
+        let mut card = [0 as c_char; sys::FLEN_CARD as usize];
+        // SAFETY: the handle is open for writing; all texts are C strings and `card` has the documented length.
+        call("write a header entry", |status| unsafe {
+            sys::ffmkky(key.as_ptr(), value.as_mut_ptr().cast(), comment.as_ptr(), card.as_mut_ptr(), status);
+            sys::ffprec(self.handle, card.as_ptr(), status);
+        })
+    }
+
+    /// Appends a header entry of text of any length.
+    pub(crate) fn write_text(&mut self, key: &str, value: &str, comment: &str) -> Result<(), Error> {
+        let (key, value, comment) = (c_text(key), c_text(value), c_text(comment));
+        // SAFETY: the handle is open for writing; all texts are C strings.
+        call("write a header entry", |status| unsafe {
+            sys::ffpkls(self.handle, key.as_ptr(), value.as_ptr(), comment.as_ptr(), status);
+        })
+    }
+
+    /// Appends the entry that announces texts over several lines.
+    pub(crate) fn write_long_text_notice(&mut self) -> Result<(), Error> {
+        // SAFETY: the handle is open for writing.
+        call("write a header entry", |status| unsafe {
+            sys::ffplsw(self.handle, status);
+        })
+    }
+
+    /// Appends HISTORY lines.
+    pub(crate) fn write_history(&mut self, text: &str) -> Result<(), Error> {
+        let text = c_text(text);
+        // SAFETY: the handle is open for writing; the text is a C string.
+        call("write a header entry", |status| unsafe {
+            sys::ffphis(self.handle, text.as_ptr(), status);
+        })
+    }
+
+    /// Writes numbers to a column, counted from 1, from element `first` of the column (counted from 0) on.
+    pub(crate) fn write_f64(
+        &mut self,
+        column: c_int,
+        (row, element): (usize, usize),
+        values: &mut [f64],
+    ) -> Result<(), Error> {
+        // SAFETY: the handle is open for writing; cfitsio reads `values.len()` elements.
+        call("write a column", |status| unsafe {
+            sys::ffpcld(
+                self.handle,
+                column,
+                row as i64 + 1,
+                element as i64 + 1,
+                values.len() as i64,
+                values.as_mut_ptr(),
+                status,
+            );
+        })
+    }
+
+    /// Writes single-precision numbers likewise.
+    pub(crate) fn write_f32(
+        &mut self,
+        column: c_int,
+        (row, element): (usize, usize),
+        values: &mut [f32],
+    ) -> Result<(), Error> {
+        // SAFETY: the handle is open for writing; cfitsio reads `values.len()` elements.
+        call("write a column", |status| unsafe {
+            sys::ffpcle(
+                self.handle,
+                column,
+                row as i64 + 1,
+                element as i64 + 1,
+                values.len() as i64,
+                values.as_mut_ptr(),
+                status,
+            );
+        })
+    }
+}
+
+impl Drop for Fits {
+    fn drop(&mut self) {
+        if !self.handle.is_null() {
+            let _guard = guard();
+            let mut status = 0;
+            // SAFETY: the handle is open and this is its last use. A failure here loses nothing: whoever writes
+            // calls `close`.
+            unsafe { sys::ffclos(self.handle, &mut status) };
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! What can be wrong with a map or a file of one, each said in one sentence with its remedy.
+
+use std::io;
+use std::path::PathBuf;
+
+/// What can be wrong with a map or a file of one.
+///
+/// HDUs are counted from 0, the primary one.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An Nside that HEALPix does not have.
+    #[error("Nside {nside} is not between 1 and 2^29")]
+    Nside {
+        /// The value given.
+        nside: usize,
+    },
+    /// NESTED order asked of an Nside that is not a power of two.
+    #[error("Nside {nside} is not a power of two, which NESTED ordering needs; use RING")]
+    NotNested {
+        /// The value given.
+        nside: usize,
+    },
+    /// A number of pixels that no grid has.
+    #[error("{pixels} values are not a HEALPix map: no Nside has 12 Nside² = {pixels} pixels")]
+    PixelCount {
+        /// The number of values.
+        pixels: usize,
+    },
+    /// A mask on another grid than its map.
+    #[error(
+        "the mask has Nside {mask} but the map has Nside {map}; bring the mask to Nside {map} first (for example with healpy.ud_grade)"
+    )]
+    MaskNside {
+        /// Nside of the map.
+        map: usize,
+        /// Nside of the mask.
+        mask: usize,
+    },
+
+    /// A problem with a particular file. The problem is part of the message and therefore not a `source`.
+    #[error("{}: {problem}", path.display())]
+    File {
+        /// The file, as it was named.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: Box<Error>,
+    },
+    /// The operating system refused.
+    #[error("cannot {action}: {cause}")]
+    Io {
+        /// What was attempted, such as "open it".
+        action: &'static str,
+        /// The operating system's reason.
+        cause: io::Error,
+    },
+    /// There is no such file.
+    #[error("there is no such file; check the name and the folder")]
+    Missing,
+    /// A folder was named where a file is needed.
+    #[error("this is a folder; name a file in it")]
+    Folder,
+    /// A pipe, device or socket was named where a file is needed.
+    #[error("this is not a regular file but a pipe or a device; save the data to a file first")]
+    NotRegular,
+    /// A name that the FITS library cannot take.
+    #[error(
+        "the path has {bytes} bytes but the FITS library takes at most {limit}; use a shorter one, such as a relative path"
+    )]
+    PathTooLong {
+        /// Length of the path.
+        bytes: usize,
+        /// The longest path that can be used.
+        limit: usize,
+    },
+    /// A name that no file can have.
+    #[error("the path holds a NUL character, which no file name can; check how it was put together")]
+    PathNul,
+
+    /// Not a file that any adapter reads.
+    #[error("this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed; convert it first")]
+    NotRecognised {
+        /// What the content looks like.
+        found: &'static str,
+    },
+    /// The FITS library refused.
+    #[error("cannot {action}: the FITS library says \"{message}\" (status {status}); check the file with fitsverify")]
+    Cfitsio {
+        /// What was attempted.
+        action: &'static str,
+        /// cfitsio's status.
+        status: i32,
+        /// cfitsio's words for it.
+        message: String,
+    },
+    /// A damaged gzip stream.
+    #[error("the gzip stream is damaged or cut short ({cause}); fetch the file again")]
+    Gzip {
+        /// The decompressor's reason.
+        cause: io::Error,
+    },
+    /// Less data than the header promises.
+    #[error(
+        "HDU {hdu} promises {needed} bytes but the file ends after {found}; it is cut short or its header is wrong, so fetch it again"
+    )]
+    Truncated {
+        /// The HDU.
+        hdu: usize,
+        /// The size that the header implies, in bytes from the beginning of the file.
+        needed: u128,
+        /// The file's size in bytes.
+        found: u64,
+    },
+
+    /// A FITS file without a HEALPix table.
+    #[error("there is no HEALPix table in this FITS file: {found}")]
+    NoHealpix {
+        /// What each HDU is.
+        found: String,
+    },
+    /// An HDU that is not there.
+    #[error("there is no HDU {hdu}; the tables are {tables}")]
+    NoSuchHdu {
+        /// The HDU asked for.
+        hdu: usize,
+        /// The tables in the file.
+        tables: String,
+    },
+    /// An HDU that is not a binary table.
+    #[error("HDU {hdu} is {found}, not a binary table; the tables are {tables}")]
+    NotATable {
+        /// The HDU asked for.
+        hdu: usize,
+        /// What it is.
+        found: String,
+        /// The tables in the file.
+        tables: String,
+    },
+    /// A keyword with an impossible value.
+    #[error("HDU {hdu} has {key} = {value}, which is not {expected}; correct the header")]
+    Keyword {
+        /// The HDU.
+        hdu: usize,
+        /// The keyword.
+        key: String,
+        /// Its value as the file has it.
+        value: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// Nside and the amount of data contradict each other.
+    #[error(
+        "HDU {hdu} has Nside {nside}, so {expected} pixels, but column '{column}' holds {found} values; correct NSIDE, FIRSTPIX and LASTPIX"
+    )]
+    NsideClash {
+        /// The HDU.
+        hdu: usize,
+        /// Its Nside.
+        nside: usize,
+        /// The number of pixels of that Nside.
+        expected: usize,
+        /// The column.
+        column: String,
+        /// The number of values in the column.
+        found: usize,
+    },
+    /// No Nside, and none to be had from the amount of data.
+    #[error("HDU {hdu} has no NSIDE, and its {pixels} values are not 12 Nside² for any Nside; add NSIDE to the header")]
+    NsideUnknown {
+        /// The HDU.
+        hdu: usize,
+        /// The number of values.
+        pixels: usize,
+    },
+    /// Indexed pixels of an unknown grid.
+    #[error(
+        "HDU {hdu} numbers its pixels in column '{column}' but has no NSIDE to say of which grid; add NSIDE to the header"
+    )]
+    NsideOfIndices {
+        /// The HDU.
+        hdu: usize,
+        /// The column of pixel numbers.
+        column: String,
+    },
+    /// Explicit indexing without an index column.
+    #[error(
+        "HDU {hdu} has INDXSCHM = EXPLICIT but no column of integers that could be pixel numbers; correct the header"
+    )]
+    NoIndexColumn {
+        /// The HDU.
+        hdu: usize,
+    },
+    /// A table without rows or without columns to read.
+    #[error("HDU {hdu} holds no data: {rows} rows and {columns} data columns; choose another HDU")]
+    Empty {
+        /// The HDU.
+        hdu: usize,
+        /// Rows of the table.
+        rows: usize,
+        /// Columns other than the index column.
+        columns: usize,
+    },
+    /// A field that is not there.
+    #[error("HDU {hdu} has no field {field}; its fields are {fields}")]
+    UnknownField {
+        /// The HDU.
+        hdu: usize,
+        /// The name or number asked for.
+        field: String,
+        /// The fields of the table.
+        fields: String,
+    },
+    /// A column that does not hold real numbers.
+    #[error("column '{column}' of HDU {hdu} is {found}, which is not a map of numbers; choose another field")]
+    ColumnKind {
+        /// The HDU.
+        hdu: usize,
+        /// The column.
+        column: String,
+        /// What it holds.
+        found: &'static str,
+    },
+    /// Rows in which pixel numbers and values do not go together.
+    #[error(
+        "a row of HDU {hdu} has {values} values in column '{column}' for {indices} pixel numbers (GRAIN {grain}); correct TFORM or GRAIN"
+    )]
+    Run {
+        /// The HDU.
+        hdu: usize,
+        /// The column of values.
+        column: String,
+        /// Values per row.
+        values: usize,
+        /// Pixel numbers per row.
+        indices: usize,
+        /// The keyword GRAIN.
+        grain: usize,
+    },
+    /// A pixel number outside of the grid.
+    #[error(
+        "HDU {hdu} gives a value to pixel {pixel}, but Nside {nside} has pixels 0 to {last}; correct NSIDE or the pixel numbers"
+    )]
+    PixelRange {
+        /// The HDU.
+        hdu: usize,
+        /// The pixel number.
+        pixel: i128,
+        /// Nside of the grid.
+        nside: usize,
+        /// The last pixel of the grid.
+        last: usize,
+    },
+    /// A pixel that occurs twice.
+    #[error("HDU {hdu} gives pixel {pixel} more than one value; remove the duplicates")]
+    Duplicate {
+        /// The HDU.
+        hdu: usize,
+        /// The pixel number, in the file's ordering.
+        pixel: usize,
+    },
+    /// A number that no multi-order cell has.
+    #[error(
+        "HDU {hdu} has UNIQ = {uniq} in row {row} (from 1), which is not 4^(order+1) + pixel for any order up to 29; correct the table"
+    )]
+    Uniq {
+        /// The HDU.
+        hdu: usize,
+        /// The number.
+        uniq: i128,
+        /// The row, from 1.
+        row: usize,
+    },
+    /// Two multi-order cells that share an area.
+    #[error("the cells UNIQ = {first} and {second} of HDU {hdu} overlap; remove one of them")]
+    Overlap {
+        /// The HDU.
+        hdu: usize,
+        /// One cell.
+        first: u64,
+        /// The other.
+        second: u64,
+    },
+    /// A multi-order map too fine to be expanded unasked.
+    #[error(
+        "the multi-order map of HDU {hdu} reaches Nside {finest}, beyond {limit}; choose the resolution to bring it to with --nside"
+    )]
+    TooFine {
+        /// The HDU.
+        hdu: usize,
+        /// Nside of the finest cells.
+        finest: usize,
+        /// The finest Nside that is used without being asked for.
+        limit: usize,
+    },
+    /// A resolution asked of a map that has but one.
+    #[error(
+        "HDU {hdu} is not a multi-order map, so it cannot be read at Nside {nside}; leave --nside out, or degrade the map first (for example with healpy.ud_grade)"
+    )]
+    NotMultiOrder {
+        /// The HDU.
+        hdu: usize,
+        /// The Nside asked for.
+        nside: usize,
+    },
+    /// More memory than there is.
+    #[error("a map of Nside {nside} needs {gibibytes:.1} GiB, more memory than there is; use a coarser map")]
+    Memory {
+        /// The Nside.
+        nside: usize,
+        /// The memory needed.
+        gibibytes: f64,
+    },
+
+    /// A file that is not to be replaced.
+    #[error("the file exists; choose another name or allow overwriting")]
+    Exists,
+    /// A folder that is not there.
+    #[error("the folder {} does not exist; create it first", folder.display())]
+    NoFolder {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A column of the wrong length.
+    #[error("column '{column}' has {found} values but Nside {nside} has {expected} pixels")]
+    ColumnLength {
+        /// The column.
+        column: String,
+        /// Its length.
+        found: usize,
+        /// Nside of the file.
+        nside: usize,
+        /// The number of pixels of that Nside.
+        expected: usize,
+    },
+    /// A header entry that FITS does not have.
+    #[error("'{key}' is not a FITS keyword, which has one to eight of A-Z, 0-9, '-' and '_'")]
+    CardKey {
+        /// The keyword.
+        key: String,
+    },
+    /// A name too long for a header entry.
+    #[error("the name or unit '{text}' is longer than the 68 characters that FITS allows; shorten it")]
+    LongName {
+        /// The text.
+        text: String,
+    },
+}
+
+impl Error {
+    /// Says which file the problem is with, unless that has been said.
+    pub(crate) fn of(self, path: &std::path::Path) -> Self {
+        match self {
+            Error::File { .. } => self,
+            problem => Error::File { path: path.to_owned(), problem: Box::new(problem) },
+        }
+    }
+
+    /// For `map_err`: an operating system's refusal of the action.
+    pub(crate) fn io(action: &'static str) -> impl Fn(io::Error) -> Self {
+        move |cause| match cause.kind() {
+            io::ErrorKind::NotFound => Error::Missing,
+            _ => Error::Io { action, cause },
+        }
+    }
+}

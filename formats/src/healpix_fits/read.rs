@@ -1,0 +1,200 @@
+//! The values of a field, brought to RING order.
+//!
+//! What the header means is left to [`super::table`], cells of several sizes to [`super::multi_order`].
+
+use rayon::prelude::*;
+
+use super::multi_order;
+use super::table::{Column, Kind, Layout, Table};
+use crate::cfitsio::Fits;
+use crate::{Error, Healpix, Map, Ordering, Selection, UNSEEN, is_bad};
+
+/// Values per call to cfitsio: many enough that calls cost nothing, few enough to stay in the cache.
+pub(super) const CHUNK: usize = 1 << 17;
+
+/// Reads one field of a table.
+pub(super) fn read(fits: &mut Fits, table: &Table, selection: &Selection) -> Result<Map, Error> {
+    let column = table.column(selection.field.as_ref())?;
+    if let (Some(nside), Layout::Implicit { .. } | Layout::Explicit { .. }) = (selection.nside, &table.layout) {
+        return Err(Error::NotMultiOrder { hdu: table.hdu, nside });
+    }
+    let canvas = match &table.layout {
+        Layout::Implicit { named } => implicit(fits, table, column, *named)?,
+        Layout::Explicit { index, grain } => explicit(fits, table, column, index, *grain)?,
+        Layout::MultiOrder { index } => multi_order::read(fits, table, column, index, selection.nside)?,
+    };
+    let mut map = Map::from_masked(canvas.grid, canvas.values);
+    map.name = column.name.clone();
+    map.unit = column.unit.clone();
+    map.coordinates = table.coordinates;
+    map.ordering = table.ordering;
+    Ok(map)
+}
+
+/// A map under construction: values come in the file's ordering and are put where RING order has them.
+pub(super) struct Canvas {
+    grid: Healpix,
+    ordering: Ordering,
+    values: Vec<f64>,
+    /// Where the values of one chunk go.
+    places: Vec<u64>,
+}
+
+impl Canvas {
+    /// A map with all pixels masked.
+    pub(super) fn new(grid: Healpix, ordering: Ordering) -> Result<Self, Error> {
+        let mut values = Vec::new();
+        values.try_reserve_exact(grid.pixels()).map_err(|_| Error::Memory {
+            nside: grid.nside(),
+            gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
+        })?;
+        values.resize(grid.pixels(), f64::NAN);
+        Ok(Canvas { grid, ordering, values, places: Vec::new() })
+    }
+
+    /// Sets consecutive pixels from `first` on.
+    pub(super) fn put_run(&mut self, first: usize, run: &[f64]) -> Result<(), Error> {
+        match self.ordering {
+            Ordering::Ring => self.values[first..first + run.len()].copy_from_slice(run),
+            Ordering::Nested => {
+                self.places.clear();
+                self.places.extend(first as u64..(first + run.len()) as u64);
+                self.scatter(run)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the pixels that `places` holds.
+    fn scatter(&mut self, values: &[f64]) -> Result<(), Error> {
+        if self.ordering == Ordering::Nested {
+            let layer = cdshealpix::nested::get(self.grid.depth()?);
+            self.places.par_iter_mut().for_each(|p| *p = layer.to_ring(*p));
+        }
+        for (&place, &value) in self.places.iter().zip(values) {
+            self.values[place as usize] = value;
+        }
+        Ok(())
+    }
+}
+
+fn implicit(fits: &mut Fits, table: &Table, column: &Column, named: Option<(usize, usize)>) -> Result<Canvas, Error> {
+    let (grid, pixels) = table.implicit(column, named)?;
+    let mut canvas = Canvas::new(grid, table.ordering)?;
+    match table.ordering {
+        Ordering::Ring => {
+            for (i, chunk) in canvas.values[pixels].chunks_mut(CHUNK).enumerate() {
+                read_values(fits, table, column, i * CHUNK, chunk)?;
+            }
+        }
+        Ordering::Nested => {
+            let mut buffer = vec![0.0; CHUNK.min(pixels.len())];
+            for start in (0..pixels.len()).step_by(CHUNK) {
+                let chunk = &mut buffer[..CHUNK.min(pixels.len() - start)];
+                read_values(fits, table, column, start, chunk)?;
+                canvas.put_run(pixels.start + start, chunk)?;
+            }
+        }
+    }
+    Ok(canvas)
+}
+
+fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, grain: usize) -> Result<Canvas, Error> {
+    let grid = table.explicit_grid(index)?;
+    let run = table.run(column, index, grain)?;
+    let total = table.rows * index.repeat;
+    let mut canvas = Canvas::new(grid, table.ordering)?;
+    let mut seen = vec![0u64; grid.pixels().div_ceil(64)];
+    let indices_per_chunk = (CHUNK / run).max(1);
+    let (mut indices, mut values) = (Vec::new(), Vec::new());
+    for start in (0..total).step_by(indices_per_chunk) {
+        let count = indices_per_chunk.min(total - start);
+        indices.resize(count, 0);
+        values.resize(count * run, 0.0);
+        read_integers(fits, index, start, &mut indices)?;
+        read_values(fits, table, column, start * run, &mut values)?;
+        canvas.places.clear();
+        for &first in &indices {
+            for pixel in first..first + run as i128 {
+                let Some(p) = usize::try_from(pixel).ok().filter(|&p| p < grid.pixels()) else {
+                    return Err(Error::PixelRange {
+                        hdu: table.hdu,
+                        pixel,
+                        nside: grid.nside(),
+                        last: grid.pixels() - 1,
+                    });
+                };
+                let (word, bit) = (p / 64, 1 << (p % 64));
+                if seen[word] & bit != 0 {
+                    return Err(Error::Duplicate { hdu: table.hdu, pixel: p });
+                }
+                seen[word] |= bit;
+                canvas.places.push(p as u64);
+            }
+        }
+        canvas.scatter(&values)?;
+    }
+    Ok(canvas)
+}
+
+/// Reads values of a column from its `start`-th on (counted over all rows); all that mean "no value" become NaN.
+pub(super) fn read_values(
+    fits: &mut Fits,
+    table: &Table,
+    column: &Column,
+    start: usize,
+    out: &mut [f64],
+) -> Result<(), Error> {
+    let from = (start / column.repeat, start % column.repeat);
+    match column.kind {
+        Kind::Real => fits.read_f64(column.number, from, false, out)?,
+        Kind::Integer { nulls } => fits.read_f64(column.number, from, nulls, out)?,
+        Kind::Logical => {
+            let mut truths = vec![0; out.len()];
+            fits.read_logical(column.number, from, &mut truths)?;
+            for (value, truth) in out.iter_mut().zip(truths) {
+                *value = if truth <= 1 { f64::from(truth) } else { f64::NAN };
+            }
+        }
+        Kind::Bits => {
+            // cfitsio reads bits as bytes, of which each row has a whole number.
+            let bytes_per_row = column.repeat.div_ceil(8);
+            let rows = (from.1 + out.len()).div_ceil(column.repeat);
+            let mut bytes = vec![0.0; rows * bytes_per_row];
+            fits.read_f64(column.number, (from.0, 0), false, &mut bytes)?;
+            for (i, value) in (start - from.0 * column.repeat..).zip(out.iter_mut()) {
+                let (row, bit) = (i / column.repeat, i % column.repeat);
+                *value = f64::from(bytes[row * bytes_per_row + bit / 8] as u8 >> (7 - bit % 8) & 1);
+            }
+        }
+        Kind::Other(found) => {
+            return Err(Error::ColumnKind { hdu: table.hdu, column: column.name.clone(), found });
+        }
+    }
+    mask(out, table.bad_data);
+    Ok(())
+}
+
+/// Makes NaN of all that means "no value": UNSEEN, the file's own marker, and what is not finite.
+fn mask(values: &mut [f64], bad_data: Option<f64>) {
+    let marker = bad_data.unwrap_or(UNSEEN);
+    for value in values {
+        if is_bad(*value, UNSEEN) || is_bad(*value, marker) {
+            *value = f64::NAN;
+        }
+    }
+}
+
+/// Reads integers of a column from its `start`-th on (counted over all rows), unsigned ones included.
+pub(super) fn read_integers(fits: &mut Fits, column: &Column, start: usize, out: &mut [i128]) -> Result<(), Error> {
+    // cfitsio applies TZERO in 64 bits or in floating point, neither of which holds every unsigned number.
+    let mut scaling = |key: &str| super::table::number(fits, &format!("{key}{}", column.number));
+    let (scale, zero) = (scaling("TSCAL")?.unwrap_or(1.0) as i128, scaling("TZERO")?.unwrap_or(0.0) as i128);
+    fits.set_scaling(column.number, 1.0, 0.0)?;
+    let mut raw = vec![0; out.len()];
+    fits.read_i64(column.number, (start / column.repeat, start % column.repeat), &mut raw)?;
+    for (value, raw) in out.iter_mut().zip(raw) {
+        *value = i128::from(raw) * scale + zero;
+    }
+    Ok(())
+}
