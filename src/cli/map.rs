@@ -162,7 +162,7 @@ impl Arguments {
         let start = Instant::now();
         let map = self.input.read(path, mask)?;
         let analysis = self.analysis();
-        let about = || format!("'{}'", path.display());
+        let about = || path.display().to_string();
         let ordering = self.ordering_for(&map, analysis.check(map.grid()).with_context(about)?)?;
         let progress = Progress::new(path.display().to_string(), self.running.quiet);
         let maps = if self.sequence {

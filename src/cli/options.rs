@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use longan::formats::{self, Field, Map, Selection};
 use longan::measures::{BuiltIn, UnknownMeasure, find};
@@ -43,7 +44,7 @@ impl Input {
         let selection = Selection { field: self.field.clone(), hdu: self.hdu, nside: self.nside };
         let mut map = formats::read(path, &selection)?;
         if let Some(mask) = mask {
-            map.apply_mask(mask, self.mask_threshold).map_err(|e| e.of(path))?;
+            map.apply_mask(mask, self.mask_threshold).with_context(|| path.display().to_string())?;
         }
         Ok(map)
     }

@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mask = arguments.input.read_mask()?;
     let map = arguments.input.read(path, mask.as_ref())?;
     let (thresholds, totals, masked) =
-        arguments.body.analysis().totals(&map).with_context(|| format!("'{}'", path.display()))?;
+        arguments.body.analysis().totals(&map).with_context(|| path.display().to_string())?;
     let whole = map.values().iter().all(|v| !v.is_nan());
     let rows: Vec<Row> = thresholds
         .values()
