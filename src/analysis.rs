@@ -10,7 +10,7 @@ use longan_measures::{Measure, Window};
 
 use crate::contour::{Body, Field};
 use crate::moments::{Selection, Weight};
-use crate::statistics::statistics;
+use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
 use crate::totals::{Totals, totals};
 use crate::window::{Moments, windows};
@@ -77,6 +77,9 @@ pub enum AnalysisError {
         /// The share.
         share: f64,
     },
+    /// Nothing to compute.
+    #[error("no measure is asked for")]
+    NoMeasure,
     /// An output Nside that does not exist.
     #[error("an output Nside of {nside} is not between 1 and 2^29")]
     NsideOut {
@@ -115,6 +118,8 @@ pub struct MinkowskiMaps {
     pub grid: Healpix,
     /// The thresholds, in the field's unit, of which these are the mean.
     pub thresholds: Thresholds,
+    /// Statistics of the field analysed.
+    pub of_map: Statistics,
     /// For each measure, in the order given, its values in RING order; NaN where masked or undefined.
     pub values: Vec<Vec<f64>>,
 }
@@ -140,20 +145,23 @@ impl Analysis {
         Ok(output)
     }
 
-    /// The thresholds in the map's unit.
+    /// The thresholds in the map's unit, and the statistics of the map that they may be counted from.
     ///
     /// # Errors
     /// Where the map is masked everywhere, or has no standard deviation to count in.
-    pub fn thresholds_of(&self, map: &Map) -> Result<Thresholds, AnalysisError> {
+    pub fn thresholds_of(&self, map: &Map) -> Result<(Thresholds, Statistics), AnalysisError> {
         let of_map = statistics(map.values()).ok_or(AnalysisError::AllMasked)?;
-        match self.threshold_unit {
-            ThresholdUnit::Value => Ok(self.thresholds.clone()),
+        let thresholds = match self.threshold_unit {
+            ThresholdUnit::Value => self.thresholds.clone(),
             ThresholdUnit::Sigma if !of_map.mean.is_finite() || !of_map.sigma.is_finite() => {
-                Err(AnalysisError::NotFinite)
+                return Err(AnalysisError::NotFinite);
             }
-            ThresholdUnit::Sigma if of_map.min == of_map.max => Err(AnalysisError::Constant { value: of_map.min }),
-            ThresholdUnit::Sigma => Ok(self.thresholds.in_units_of(of_map.mean, of_map.sigma)?),
-        }
+            ThresholdUnit::Sigma if of_map.sigma == 0.0 => {
+                return Err(AnalysisError::Constant { value: of_map.mean });
+            }
+            ThresholdUnit::Sigma => self.thresholds.in_units_of(of_map.mean, of_map.sigma)?,
+        };
+        Ok((thresholds, of_map))
     }
 
     /// Minkowski maps: each measure in windows about all pixels of the output grid, averaged over the thresholds.
@@ -168,8 +176,43 @@ impl Analysis {
         measures: &[impl AsRef<dyn Measure> + Sync],
         progress: impl FnMut(f64),
     ) -> Result<MinkowskiMaps, AnalysisError> {
+        self.check(map.grid())?;
+        let (thresholds, of_map) = self.thresholds_of(map)?;
+        self.at(thresholds, of_map, map, measures, progress)
+    }
+
+    /// The same for every threshold by itself, in ascending order.
+    ///
+    /// # Errors
+    /// As [`minkowski_maps`](Self::minkowski_maps).
+    pub fn sequence(
+        &self,
+        map: &Map,
+        measures: &[impl AsRef<dyn Measure> + Sync],
+        mut progress: impl FnMut(f64),
+    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
+        self.check(map.grid())?;
+        let (thresholds, of_map) = self.thresholds_of(map)?;
+        let count = thresholds.values().len() as f64;
+        let each = |(i, &threshold): (usize, &f64)| {
+            let alone = Thresholds::new(vec![threshold])?;
+            self.at(alone, of_map, map, measures, |share| progress((i as f64 + share) / count))
+        };
+        thresholds.values().iter().enumerate().map(each).collect()
+    }
+
+    fn at(
+        &self,
+        thresholds: Thresholds,
+        of_map: Statistics,
+        map: &Map,
+        measures: &[impl AsRef<dyn Measure> + Sync],
+        progress: impl FnMut(f64),
+    ) -> Result<MinkowskiMaps, AnalysisError> {
         let grid = self.check(map.grid())?;
-        let thresholds = self.thresholds_of(map)?;
+        if measures.is_empty() {
+            return Err(AnalysisError::NoMeasure);
+        }
         let selection = self.selection(measures);
         let evaluate = |moments: &Moments, values: &mut [f64]| {
             let window = Window {
@@ -193,27 +236,7 @@ impl Analysis {
         };
         let field = Field::new(map.grid(), map.values(), &thresholds, self.body);
         let values = windows(&field, &selection, grid, self.window.to_radians(), measures.len(), evaluate, progress);
-        Ok(MinkowskiMaps { grid, thresholds, values })
-    }
-
-    /// The same for every threshold by itself, in ascending order.
-    ///
-    /// # Errors
-    /// As [`minkowski_maps`](Self::minkowski_maps).
-    pub fn sequence(
-        &self,
-        map: &Map,
-        measures: &[impl AsRef<dyn Measure> + Sync],
-        mut progress: impl FnMut(f64),
-    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
-        let thresholds = self.thresholds_of(map)?;
-        let count = thresholds.values().len() as f64;
-        let each = |(i, &threshold): (usize, &f64)| {
-            let thresholds = Thresholds::new(vec![threshold])?;
-            let alone = Analysis { thresholds, threshold_unit: ThresholdUnit::Value, ..self.clone() };
-            alone.minkowski_maps(map, measures, |share| progress((i as f64 + share) / count))
-        };
-        thresholds.values().iter().enumerate().map(each).collect()
+        Ok(MinkowskiMaps { grid, thresholds, of_map, values })
     }
 
     /// Area, length and curvature of the whole unmasked sphere for each threshold, with the thresholds in the map's
@@ -222,7 +245,7 @@ impl Analysis {
     /// # Errors
     /// See [`thresholds_of`](Self::thresholds_of).
     pub fn totals(&self, map: &Map) -> Result<(Thresholds, Vec<Totals>, f64), AnalysisError> {
-        let thresholds = self.thresholds_of(map)?;
+        let (thresholds, _) = self.thresholds_of(map)?;
         let (totals, masked) = totals(&Field::new(map.grid(), map.values(), &thresholds, self.body));
         Ok((thresholds, totals, masked))
     }

@@ -11,8 +11,10 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, dvec3};
+use glam::DVec3;
 use longan_formats::Healpix;
+
+use crate::angles;
 
 /// A corner of a stencil: the pixel `column` of `ring` in the first sector; `per_sector` pixels further in each next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,7 +54,7 @@ impl Stencil {
 
     /// The corners of the copy in this sector, counter-clockwise seen from outside; only the first
     /// [`count`](Self::count) are meant.
-    #[inline]
+    #[inline(always)]
     pub fn pixels(&self, sector: usize) -> [Pixel; 4] {
         self.corners.map(|c| {
             let mut column = c.column + sector * c.per_sector;
@@ -137,9 +139,17 @@ impl CellRing {
             let ring = self.grid.ring(corner.ring);
             let (sin_phi, cos_phi) = (ring.phi(corner.column as isize) - stencil.meridian).sin_cos();
             let (sin, cos) = (ring.sin_theta, ring.cos_theta);
-            geometry.corner[c] = dvec3(sin * cos_phi, sin * sin_phi, cos);
-            geometry.south[c] = dvec3(cos * cos_phi, cos * sin_phi, -sin);
-            geometry.east[c] = dvec3(-sin_phi, cos_phi, 0.0);
+            let at = [sin * cos_phi, sin * sin_phi, cos];
+            geometry.corner[c] = at.into();
+            for (component, value) in geometry.frames.at.iter_mut().zip(at) {
+                component[c] = value;
+            }
+            for (component, value) in geometry.frames.south.iter_mut().zip([cos * cos_phi, cos * sin_phi, -sin]) {
+                component[c] = value;
+            }
+            for (component, value) in geometry.frames.east.iter_mut().zip([-sin_phi, cos_phi]) {
+                component[c] = value;
+            }
         }
         for c in 0..stencil.count {
             let (a, b) = (geometry.corner[c], geometry.corner[(c + 1) % stencil.count]);
@@ -153,6 +163,17 @@ impl CellRing {
     }
 }
 
+/// The corners of a cell as unit vectors x, y, z and the tangent frames there; each component for all corners.
+#[derive(Clone, Debug, Default)]
+pub struct Frames {
+    /// Unit vectors.
+    pub at: [[f64; 4]; 3],
+    /// e_θ.
+    pub south: [[f64; 4]; 3],
+    /// e_φ; its z component is 0.
+    pub east: [[f64; 4]; 2],
+}
+
 /// Where a cell's corners lie, in a frame turned about the pole.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
@@ -160,10 +181,8 @@ pub struct Geometry {
     pub count: usize,
     /// Unit vectors of the corners.
     pub corner: [DVec3; 4],
-    /// e_θ at each corner.
-    pub south: [DVec3; 4],
-    /// e_φ at each corner.
-    pub east: [DVec3; 4],
+    /// The corners and their frames, component by component.
+    pub frames: Frames,
     /// Unit tangent at each corner along the edge to the next.
     pub along: [DVec3; 4],
     /// Length of that edge in radians.
@@ -172,9 +191,9 @@ pub struct Geometry {
 
 impl Geometry {
     /// The point at this fraction of the edge from corner `edge` to the next.
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, edge: usize, fraction: f64) -> DVec3 {
-        let (sin, cos) = (fraction * self.arc[edge]).sin_cos();
+        let (sin, cos) = angles::sin_cos(fraction * self.arc[edge]);
         self.corner[edge] * cos + self.along[edge] * sin
     }
 

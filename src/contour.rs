@@ -11,6 +11,7 @@ use glam::DVec3;
 use longan_formats::Healpix;
 use rayon::prelude::*;
 
+use crate::angles;
 use crate::cells::{CellRing, Geometry, Pixel, area_of_triangle};
 use crate::thresholds::Thresholds;
 use crate::transport::{self, Phases};
@@ -96,7 +97,7 @@ pub struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    #[inline]
+    #[inline(always)]
     fn new(geometry: &'a Geometry, (from_edge, from): (usize, DVec3), (to_edge, to): (usize, DVec3), body: Body) -> Self {
         let cross = to.cross(from);
         let sin = cross.length();
@@ -105,14 +106,14 @@ impl<'a> Segment<'a> {
     }
 
     /// Length in radians.
-    #[inline]
+    #[inline(always)]
     pub fn length(&self) -> f64 {
-        self.sin.atan2(self.from.dot(self.to))
+        angles::from_sin_cos(self.sin, self.from.dot(self.to))
     }
 
     /// Direction of the normal at each corner, after transport there from the segment's midpoint: e^{iϕ} with ϕ
     /// counted from south towards east.
-    #[inline]
+    #[inline(always)]
     pub fn directions(&self) -> Phases<4> {
         let midpoint = self.from + self.to;
         transport::to_corners(self.normal, midpoint, midpoint.length(), self.geometry)
@@ -146,6 +147,9 @@ pub trait Sink {
 }
 
 /// Marches through all cells of these cell rings (`0..=4 Nside`), ring by ring and eastwards within a sector.
+///
+/// Inlined, so that callers compiled for a processor's own instructions make use of them here.
+#[inline(always)]
 pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
     for i in rings {
         let ring = CellRing::new(field.grid, i);
@@ -198,7 +202,7 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
 
 /// Body and contour in a cell that the contour at threshold `t` crosses; `above` tells which corners are ≥ t.
 #[allow(clippy::too_many_arguments)]
-#[inline]
+#[inline(always)]
 fn cut(
     field: &Field<'_>,
     t: usize,

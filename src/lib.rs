@@ -32,6 +32,7 @@
 //! unit sphere, in radians and steradian.
 
 mod analysis;
+mod angles;
 pub mod cells;
 pub mod contour;
 pub mod moments;

@@ -102,8 +102,13 @@ pub fn at_pixels(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Vec
     let mut gather =
         Gather { layout, first: rings.start, rings: moments.collect(), cell: vec![[0.0; 4]; layout.rows] };
     // A pixel's cells lie on its own ring and the two beside it.
-    march(field, rings.start - 1..rings.end + 1, &mut gather);
+    march_into(field, rings.start - 1..rings.end + 1, &mut gather);
     gather.rings
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn march_into(field: &Field<'_>, rings: Range<usize>, gather: &mut Gather<'_>) {
+    march(field, rings, gather);
 }
 
 struct Gather<'a> {
@@ -116,7 +121,7 @@ struct Gather<'a> {
 
 impl Gather<'_> {
     /// Adds one share for each corner to a row.
-    #[inline]
+    #[inline(always)]
     fn share(&mut self, cell: Cell<'_>, row: usize, share: impl Fn(usize) -> f64) {
         for (c, pixel) in cell.pixels[..cell.count].iter().enumerate() {
             if let Some(ring) = pixel.ring.checked_sub(self.first).and_then(|i| self.rings.get_mut(i)) {
@@ -149,7 +154,7 @@ impl Sink for Gather<'_> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn segment(&mut self, _: Cell<'_>, _: usize, segment: &Segment<'_>) {
         let layout = self.layout;
         let by_length = layout.weight == Weight::Length && !layout.ranks.is_empty();
@@ -176,6 +181,7 @@ impl Sink for Gather<'_> {
         }
     }
 
+    #[inline(always)]
     fn finished(&mut self, cell: Cell<'_>) {
         let part = 1.0 / cell.count as f64;
         for row in 0..self.cell.len() {

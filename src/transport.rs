@@ -32,7 +32,7 @@ impl RingTransport {
     }
 
     /// e^{iδ} for a difference Δφ = φ_x − φ_w of longitude; 1 at the antipode, where no geodesic is singled out.
-    #[inline]
+    #[inline(always)]
     pub fn phase(&self, cos_dphi: f64, sin_dphi: f64) -> Complex64 {
         let one_plus_dot = self.one_plus_cosines + self.sines * cos_dphi;
         if one_plus_dot > ANTIPODE {
@@ -50,15 +50,17 @@ pub const ANTIPODE: f64 = 1e-15;
 
 /// The tangent vector v at x, where x is `midpoint` over its length, as e^{iϕ} at each corner of a cell after
 /// transport there. v is a unit vector at right angles to x.
-#[inline]
+#[inline(always)]
 pub fn to_corners(v: DVec3, midpoint: DVec3, length: f64, geometry: &Geometry) -> Phases<4> {
     let mut phases = Phases::default();
+    let (v, x, frames) = (v.to_array(), midpoint.to_array(), &geometry.frames);
     for c in 0..4 {
-        let (w, south, east) = (geometry.corner[c], geometry.south[c], geometry.east[c]);
+        let dot = |a: [f64; 3], b: &[[f64; 4]; 3]| a[0] * b[0][c] + a[1] * b[1][c] + a[2] * b[2][c];
+        let dot_east = |a: [f64; 3]| a[0] * frames.east[0][c] + a[1] * frames.east[1][c];
         // Both frames at w are at right angles to w, so only the part of x + w along x counts.
-        let along = v.dot(w) / (length + midpoint.dot(w));
-        phases.re[c] = v.dot(south) - along * midpoint.dot(south);
-        phases.im[c] = v.dot(east) - along * midpoint.dot(east);
+        let along = dot(v, &frames.at) / (length + dot(x, &frames.at));
+        phases.re[c] = dot(v, &frames.south) - along * dot(x, &frames.south);
+        phases.im[c] = dot_east(v) - along * dot_east(x);
     }
     phases
 }
@@ -80,7 +82,7 @@ impl<const N: usize> Default for Phases<N> {
 }
 
 impl<const N: usize> Phases<N> {
-    #[inline]
+    #[inline(always)]
     fn multiply(&mut self, by: &Self) {
         for k in 0..N {
             let (re, im) = (self.re[k], self.im[k]);
@@ -100,13 +102,13 @@ pub struct Powers<const N: usize> {
 
 impl<const N: usize> Powers<N> {
     /// Starts at the power 1.
-    #[inline]
+    #[inline(always)]
     pub fn new(base: Phases<N>) -> Self {
         Powers { base, power: base, rank: 1 }
     }
 
     /// The powers `rank` ≥ 1, which must not be below the last one asked for.
-    #[inline]
+    #[inline(always)]
     pub fn raise(&mut self, rank: u32) -> &Phases<N> {
         let mut missing = rank - self.rank;
         self.rank = rank;

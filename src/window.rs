@@ -162,6 +162,8 @@ struct Reached {
     transport: RingTransport,
     /// cos and sin of k pixels' longitude, k < BLOCK.
     steps: [Complex64; BLOCK],
+    /// The same for BLOCK pixels.
+    stride: Complex64,
 }
 
 impl OutputRing {
@@ -184,6 +186,7 @@ impl OutputRing {
                 half_width,
                 transport: RingTransport::new((r.sin_theta, r.cos_theta), (centre.sin_theta, centre.cos_theta)),
                 steps: std::array::from_fn(|k| Complex64::cis(k as f64 * step)),
+                stride: Complex64::cis(BLOCK as f64 * step),
             })
         });
         OutputRing { output, ring, input, reached: if radius == 0.0 { Vec::new() } else { reached.collect() } }
@@ -271,7 +274,7 @@ impl Reached {
 }
 
 /// Adds the moments of a range of pixels of a ring, transported; the first pixel lies `dphi` east of the centre.
-#[inline(never)]
+#[multiversion::multiversion(targets = "simd")]
 fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, dphi: f64, reached: &Reached, sums: &mut [f64]) {
     for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
         *sum += ring.row(row)[columns.clone()].iter().sum::<f64>();
@@ -279,15 +282,15 @@ fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, dphi: f64, re
     if layout.ranks.is_empty() {
         return;
     }
-    let step = TAU / reached.len as f64;
+    let mut base = Complex64::cis(dphi);
     for start in columns.clone().step_by(BLOCK) {
-        let base = Complex64::cis(dphi + (start - columns.start) as f64 * step);
         let mut phases = Phases::<BLOCK>::default();
         for k in 0..BLOCK {
             let dphi = base * reached.steps[k];
             let phase = reached.transport.phase(dphi.re, dphi.im);
             (phases.re[k], phases.im[k]) = (phase.re, phase.im);
         }
+        base *= reached.stride;
         let end = (start + BLOCK).min(columns.end);
         let mut powers = Powers::new(phases);
         for (i, &rank) in layout.ranks.iter().enumerate() {

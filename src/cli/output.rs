@@ -4,7 +4,6 @@ use std::path::Path;
 
 use longan::formats::{Card, CardValue, Column, CoordinateSystem, Extension, HealpixFile, Map, Ordering};
 use longan::measures::Measure;
-use longan::statistics::statistics;
 use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
 
 use super::options::Input;
@@ -60,10 +59,11 @@ impl Provenance<'_> {
         let sequence = maps.len() > 1;
         let grid = maps[0].grid;
         let extensions = maps.into_iter().enumerate().map(|(i, maps)| {
+            let cards = self.cards(&maps);
             let columns = measures.iter().zip(maps.values);
             Extension {
                 name: if sequence { format!("THRESHOLD {}", i + 1) } else { "MINKOWSKI MAP".to_owned() },
-                cards: self.cards(maps.thresholds.values()),
+                cards,
                 history: Vec::new(),
                 columns: columns
                     .map(|(measure, values)| Column { name: measure.column(), unit: measure.unit().to_owned(), values })
@@ -77,8 +77,8 @@ impl Provenance<'_> {
         self.map.coordinates
     }
 
-    fn cards(&self, thresholds: &[f64]) -> Vec<Card> {
-        let (map, analysis) = (self.map, self.analysis);
+    fn cards(&self, maps: &MinkowskiMaps) -> Vec<Card> {
+        let (map, analysis, thresholds) = (self.map, self.analysis, maps.thresholds.values());
         let mut cards = vec![
             creator(),
             text("INFILE", self.path.to_string_lossy(), "file analysed"),
@@ -93,11 +93,9 @@ impl Provenance<'_> {
             }
             cards.push(real("MASKTHR", self.input.mask_threshold, "masked below this mask value"));
         }
-        if let Some(of_map) = statistics(map.values()) {
-            cards.push(real("INMEAN", of_map.mean, "mean of the unmasked pixels"));
-            cards.push(real("INSIGMA", of_map.sigma, "their standard deviation"));
-        }
         cards.extend([
+            real("INMEAN", maps.of_map.mean, "mean of the unmasked pixels"),
+            real("INSIGMA", maps.of_map.sigma, "their standard deviation"),
             real("WINDOW", analysis.window, "[deg] radius of the window, 0: the pixel itself"),
             real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
             text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
