@@ -1,0 +1,216 @@
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use longan::formats::{self, Selection};
+use longan::measures::{BuiltIn, find};
+use longan::{Analysis, Map, ThresholdUnit, Thresholds};
+
+use super::skipped;
+
+/// Relative to a column's largest value.
+const TOLERANCE: f64 = 1e-9;
+
+/// The folder of data and references, if there is one.
+fn shared() -> Option<PathBuf> {
+    let folder = std::env::var_os("LONGAN_SHARED").map(PathBuf::from);
+    if folder.is_none() {
+        skipped("LONGAN_SHARED is not set, so the reference values are not compared");
+    }
+    folder
+}
+
+struct Table {
+    thresholds: Option<Vec<f64>>,
+    columns: HashMap<String, Vec<f64>>,
+}
+
+impl Table {
+    fn read(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap();
+        let thresholds = text.lines().find_map(|l| l.strip_prefix("# thresholds:"));
+        let mut rows = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(','));
+        let names: Vec<&str> = rows.next().unwrap().collect();
+        let mut columns = vec![Vec::new(); names.len()];
+        for row in rows {
+            for (column, value) in columns.iter_mut().zip(row) {
+                column.push(value.parse().unwrap());
+            }
+        }
+        Table {
+            thresholds: thresholds.map(|t| t.split_whitespace().map(|x| x.parse().unwrap()).collect()),
+            columns: names.into_iter().map(str::to_owned).zip(columns).collect(),
+        }
+    }
+}
+
+fn read(path: &Path) -> Map {
+    formats::read(path, &Selection::default()).unwrap()
+}
+
+fn close(what: &str, got: &[f64], want: &[f64]) {
+    assert_eq!(got.len(), want.len(), "{what}");
+    let largest = want.iter().filter(|x| x.is_finite()).fold(0.0, |a: f64, x| a.max(x.abs()));
+    for (i, (g, w)) in got.iter().zip(want).enumerate() {
+        assert!((g - w).abs() <= TOLERANCE * largest.max(f64::MIN_POSITIVE), "{what}, row {i}: {g}, not {w}");
+    }
+}
+
+/// All moments, the functionals, EVQ and rank 4 of one reference file, as they stand: no rescaling, no rejection.
+fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64, nside_out: usize) {
+    let table = Table::read(&shared.join("reference").join(format!("{name}.csv")));
+    let mut map = read(&shared.join("data").join(data));
+    if let Some(mask) = mask {
+        map.apply_mask(&read(&shared.join("data").join(mask)), 0.9).unwrap();
+    }
+    let thresholds = Thresholds::new(table.thresholds.clone().unwrap()).unwrap();
+    let analysis = Analysis {
+        window,
+        thresholds: thresholds.clone(),
+        threshold_unit: ThresholdUnit::Value,
+        nside_out: Some(nside_out),
+        max_masked: 1.0,
+        ..Analysis::default()
+    };
+    let column = |name: &str| &table.columns[name];
+    let run = |names: &[&str]| {
+        let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
+        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().values
+    };
+
+    let names = ["masked-fraction", "w0", "contour-length", "w2", "evq", "rank4-min", "rank4-mid", "rank4-max"];
+    let values = run(&names);
+    let fraction = column("masked_fraction");
+    close("masked fraction", &filled(&values[0], 1.0), fraction);
+    let undone = |values: &[f64]| -> Vec<f64> {
+        filled(values, 0.0).iter().zip(fraction).map(|(v, f)| v * (1.0 - f)).collect()
+    };
+    close("w0", &undone(&values[1]), column("w0"));
+    close("w1", &filled(&values[2], 0.0), column("w1"));
+    close("w2", &undone(&values[3]), column("w2"));
+    for (i, name) in ["rank4_min", "rank4_mid", "rank4_max"].iter().enumerate() {
+        close(name, &filled(&values[5 + i], 0.0), column(name));
+    }
+    // The quotient amplifies the rounding of the printed moments where one eigenvalue nearly vanishes.
+    let mut compared = 0;
+    for (p, (got, want)) in values[4].iter().zip(column("evq")).enumerate() {
+        let (psi0, psi2) = (column("w1")[p], column("psi2_re")[p].hypot(column("psi2_im")[p]));
+        if psi0 - psi2 > 1e-3 * psi0 {
+            assert!((got / want - 1.0).abs() < 1e-6 * 1e-3 * psi0 / (psi0 - psi2) + 1e-8, "evq, row {p}: {got}, not {want}");
+            compared += 1;
+        } else if psi0 == 0.0 {
+            assert!(got.is_nan());
+        }
+    }
+    assert!(compared > 100);
+    for s in 1..=8 {
+        let (re, im) = (column(&format!("psi{s}_re")), column(&format!("psi{s}_im")));
+        let values = run(&[&format!("psi{s}"), &format!("psi{s}-direction")]);
+        let of = |part: fn(f64) -> f64| -> Vec<f64> {
+            let angle = |p: usize| (values[1][p] * s as f64).to_radians();
+            (0..re.len()).map(|p| if values[1][p].is_nan() { 0.0 } else { values[0][p] * part(angle(p)) }).collect()
+        };
+        close(&format!("psi{s}_re"), &of(f64::cos), re);
+        close(&format!("psi{s}_im"), &of(f64::sin), im);
+    }
+
+    let totals_table = Table::read(&shared.join("reference").join(format!("{name}_totals.csv")));
+    let (_, totals, masked) = analysis.totals(&map).unwrap();
+    let of = |f: fn(&longan::totals::Totals) -> f64| totals.iter().map(f).collect::<Vec<_>>();
+    close("area", &of(|t| t.area), &totals_table.columns["area_sr"]);
+    close("length", &of(|t| t.length), &totals_table.columns["length_rad"]);
+    close("curvature", &of(|t| t.curvature), &totals_table.columns["curvature"]);
+    close("χ", &of(|t| t.euler_characteristic()), &totals_table.columns["euler_characteristic"]);
+    assert_eq!(masked > 0.0, mask.is_some());
+
+    if table.columns.contains_key("litchi_evq") {
+        check_litchi(&table, &run);
+    }
+}
+
+/// litchi by quantiles of the relative difference: it differs at the boundaries of the polar caps, where it counts cells
+/// twice, and elsewhere by its finite differences.
+fn check_litchi(table: &Table, run: &dyn Fn(&[&str]) -> Vec<Vec<f64>>) {
+    let pairs = [
+        ("evq", "litchi_evq"),
+        ("psi2", "litchi_psi2_abs"),
+        ("psi4", "litchi_psi4_abs"),
+        ("rank4-mid", "litchi_rank4_mid"),
+        ("psi1", "litchi_psi1_abs"),
+        ("w0", "litchi_w0"),
+        ("w1", "litchi_w1"),
+        ("w2", "litchi_w2"),
+    ];
+    let grid = longan::Healpix::with_pixels(table.columns["w0"].len()).unwrap();
+    // Windows of 6° that keep clear of the caps' boundaries: in the belt, and in the caps away from the meridians.
+    let clear: Vec<usize> = (0..grid.pixels())
+        .filter(|&p| {
+            let (theta, _) = grid.centre(p);
+            (theta.cos().abs().acos().to_degrees() - 48.19) > 7.0
+        })
+        .collect();
+    assert!(clear.len() > 1000);
+    for (name, litchi) in pairs {
+        let (ours, theirs) = (&run(&[name])[0], &table.columns[litchi]);
+        let scale = theirs.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+        let mut errors: Vec<f64> = clear.iter().map(|&p| (ours[p] - theirs[p]).abs() / scale).collect();
+        errors.sort_by(f64::total_cmp);
+        let quantile = |q: f64| errors[((errors.len() - 1) as f64 * q) as usize];
+        println!("{name}: median {:.1e}, 99 % {:.1e}, largest {:.1e}", quantile(0.5), quantile(0.99), quantile(1.0));
+        assert!(quantile(0.5) < 2e-7 && quantile(1.0) < 1e-3, "{name}");
+    }
+}
+
+fn filled(values: &[f64], empty: f64) -> Vec<f64> {
+    values.iter().map(|v| if v.is_nan() { empty } else { *v }).collect()
+}
+
+#[test]
+fn gaussian_sky_of_nside_128() {
+    let Some(shared) = shared() else { return };
+    check(&shared, "grf_nside128", "grf_nside128_ring_f64.fits", None, 6.0, 16);
+}
+
+#[test]
+fn masked_gaussian_sky_of_nside_128() {
+    let Some(shared) = shared() else { return };
+    check(&shared, "grf_nside128_masked", "grf_nside128_ring_f64.fits", Some("mask_nside128.fits"), 6.0, 16);
+}
+
+#[test]
+fn gaussian_sky_of_nside_64() {
+    let Some(shared) = shared() else { return };
+    check(&shared, "grf_nside64", "grf_nside64_ring_f64.fits", None, 10.0, 8);
+}
+
+#[test]
+fn single_pixels_of_nside_64() {
+    let Some(shared) = shared() else { return };
+    check(&shared, "grf_nside64_pixels", "grf_nside64_ring_f64.fits", None, 0.0, 64);
+}
+
+#[test]
+fn wmap_sky() {
+    let Some(shared) = shared() else { return };
+    check(&shared, "wmap_nside32", "wmap_w_7yr_nside32.fits", None, 20.0, 8);
+}
+
+#[test]
+fn masked_wmap_sky() {
+    let Some(shared) = shared() else { return };
+    check(&shared, "wmap_nside32_masked", "wmap_w_7yr_nside32.fits", Some("wmap_mask_7yr_nside32.fits"), 20.0, 8);
+}
+
+#[test]
+fn layouts_of_one_sky_agree() {
+    let Some(shared) = shared() else { return };
+    let run = |file: &str| {
+        let map = read(&shared.join("data").join(file));
+        let measures = ["evq", "w0"].map(|n| find(n).unwrap());
+        Analysis::default().minkowski_maps(&map, &measures, |_| ()).unwrap().values
+    };
+    let (ring, nested) = (run("grf_nside128_ring_f64.fits"), run("grf_nside128_nested_f32.fits.gz"));
+    for (a, b) in ring.iter().zip(&nested) {
+        // The precision of single-precision input.
+        assert!(super::difference(a, b) < 2e-4, "{}", super::difference(a, b));
+    }
+}

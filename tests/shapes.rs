@@ -1,0 +1,150 @@
+use std::f64::consts::{PI, TAU};
+
+use longan::measures::{BuiltIn, find};
+use longan::simulate::{Body as Solid, Edge, Shape, Waves, shapes};
+use longan::{Analysis, Body, Healpix, Map, ThresholdUnit, Thresholds};
+
+fn at(threshold: f64) -> Analysis {
+    Analysis {
+        thresholds: Thresholds::new(vec![threshold]).unwrap(),
+        threshold_unit: ThresholdUnit::Value,
+        ..Analysis::default()
+    }
+}
+
+fn solid(shape: Shape, lon: f64, lat: f64, size: f64) -> Solid {
+    Solid::new(shape, lon, lat, size, 0.0).unwrap()
+}
+
+/// Measures in the window about the output pixel that holds a place.
+fn there(map: &Map, analysis: &Analysis, names: &[&str], (lon, lat): (f64, f64)) -> Vec<f64> {
+    let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
+    let maps = analysis.minkowski_maps(map, &measures, |_| ()).unwrap();
+    let pixel = maps.grid.pixel_at((90.0 - lat).to_radians(), lon.to_radians());
+    maps.values.iter().map(|v| v[pixel]).collect()
+}
+
+#[test]
+fn binary_rectangles_have_the_paper_s_quotients() {
+    let grid = Healpix::new(512).unwrap();
+    for (shape, size, expected) in
+        [(Shape::Square, 4.0, 1.002), (Shape::Rectangle2, 6.0, 2.003), (Shape::Rectangle3, 6.0, 3.010)]
+    {
+        let map = shapes(grid, &[solid(shape, 0.0, 0.0, size)], Edge::Binary);
+        let evq = there(&map, &at(0.5), &["evq"], (0.0, 0.0))[0];
+        assert!((evq - expected).abs() < 6e-4, "{shape}: {evq}, not {expected}");
+    }
+}
+
+#[test]
+fn smooth_rectangles_have_the_moments_of_their_sides() {
+    let grid = Healpix::new(512).unwrap();
+    for (shape, a, b) in [(Shape::Square, 4.0, 4.0), (Shape::Rectangle2, 6.0, 3.0), (Shape::Rectangle3, 6.0, 2.0)] {
+        let map = shapes(grid, &[solid(shape, 20.0, 30.0, a)], Edge::Smooth);
+        let got = there(&map, &Analysis { window: 8.0, ..at(0.0) }, &["psi2", "psi4", "w1"], (20.0, 30.0));
+        let (a, b) = (f64::to_radians(a), f64::to_radians(b));
+        // Corners are cut by a pixel, and sides are great circles.
+        assert!((got[0] - 2.0 * (a - b)).abs() < 0.01 * (a + b), "{shape}: {got:?}");
+        assert!((got[1] / (2.0 * (a + b)) - 1.0).abs() < 0.03, "{shape}: {got:?}");
+        assert!((got[2] / (2.0 * (a + b)) - 1.0).abs() < 0.02, "{shape}: {got:?}");
+    }
+}
+
+#[test]
+fn a_smooth_cap_is_round() {
+    for (nside, lon, lat) in [(256, 10.0, 0.0), (256, 70.0, 41.8), (256, 200.0, 90.0), (200, 45.0, -60.0)] {
+        let map = shapes(Healpix::new(nside).unwrap(), &[solid(Shape::Cap, lon, lat, 6.0)], Edge::Smooth);
+        let names = ["w0", "w1", "w2", "psi1", "psi2", "psi3", "psi4", "psi5", "psi6"];
+        let got = there(&map, &Analysis { window: 10.0, ..at(0.0) }, &names, (lon, lat));
+        let r = 3f64.to_radians();
+        assert!((got[0] / (TAU * (1.0 - r.cos())) - 1.0).abs() < 3e-4, "area {got:?}");
+        assert!((got[1] / (TAU * r.sin()) - 1.0).abs() < 3e-4, "length {got:?}");
+        // The window holds all of the contour, so Gauss–Bonnet holds within it.
+        assert!((got[0] + got[2] - TAU).abs() < 1e-9, "curvature {got:?}");
+        for psi in &got[3..] {
+            assert!(psi / got[1] < 2e-3, "{got:?}");
+        }
+    }
+}
+
+#[test]
+fn a_triangle_has_only_every_third_moment() {
+    let map = shapes(Healpix::new(512).unwrap(), &[solid(Shape::Triangle, 0.0, 10.0, 4.0)], Edge::Smooth);
+    let got = there(&map, &Analysis { window: 8.0, ..at(0.0) }, &["q1", "q2", "q3", "q4", "q5", "q6"], (0.0, 10.0));
+    for (i, q) in got.iter().enumerate() {
+        let limit = f64::from(u8::from((i + 1) % 3 == 0));
+        assert!((q - limit).abs() < 0.05, "q{}: {q}", i + 1);
+    }
+}
+
+#[test]
+fn euler_characteristics_count_components_less_holes() {
+    let grid = Healpix::new(64).unwrap();
+    let chi = |bodies: &[Solid], threshold, body| {
+        let (_, totals, _) = Analysis { body, ..at(threshold) }.totals(&shapes(grid, bodies, Edge::Smooth)).unwrap();
+        let chi = totals[0].euler_characteristic();
+        assert!((chi - chi.round()).abs() < 1e-10);
+        chi.round()
+    };
+    let caps: Vec<Solid> = (0..5).map(|i| solid(Shape::Cap, 60.0 * f64::from(i), 70.0 - 30.0 * f64::from(i), 15.0)).collect();
+    for n in 1..=5 {
+        assert_eq!(chi(&caps[..n], 0.0, Body::Above), n as f64);
+        assert_eq!(chi(&caps[..n], 0.0, Body::Below), 2.0 - n as f64);
+    }
+    assert_eq!(chi(&caps, -400.0, Body::Above), 2.0);
+    assert_eq!(chi(&caps, 400.0, Body::Above), 0.0);
+    // An annulus: near the equator, by its distance from the pole.
+    let belt = (0..grid.pixels()).map(|p| -grid.centre(p).0.cos().abs()).collect();
+    let (_, totals, _) = at(-0.4).totals(&Map::new("", belt).unwrap()).unwrap();
+    assert!(totals[0].euler_characteristic().abs() < 1e-10);
+    assert!((totals[0].area - 4.0 * PI * 0.4).abs() < 2e-3);
+    assert!((totals[0].length - 2.0 * TAU * (1.0f64 - 0.16).sqrt()).abs() < 2e-3);
+}
+
+#[test]
+fn random_waves_follow_the_gaussian_curves() {
+    // Means over realisations; both contours and their neighbours are resolved by 10 pixels a correlation angle.
+    let grid = Healpix::new(64).unwrap();
+    let realisations = 12;
+    let nus: Vec<f64> = (-4..=4).map(|i| f64::from(i) / 2.0).collect();
+    let analysis = Analysis { thresholds: Thresholds::new(nus.clone()).unwrap(), ..at(0.0) };
+    let mut sums = vec![[0.0f64; 3]; nus.len()];
+    let mut squares = sums.clone();
+    let mut slope = 0.0;
+    for seed in 0..realisations {
+        let waves = Waves::new(9.0, seed).unwrap();
+        slope = waves.sigma1() / waves.sigma0();
+        let (_, totals, _) = analysis.totals(&waves.map(grid)).unwrap();
+        for ((sum, square), t) in sums.iter_mut().zip(&mut squares).zip(totals) {
+            for (i, x) in [t.area, t.length, t.euler_characteristic()].into_iter().enumerate() {
+                sum[i] += x / realisations as f64;
+                square[i] += x * x / realisations as f64;
+            }
+        }
+    }
+    for ((nu, mean), square) in nus.iter().zip(&sums).zip(&squares) {
+        let sphere = 4.0 * PI;
+        let gauss = (-nu * nu / 2.0).exp();
+        let above = upper_tail(*nu);
+        let expected = [
+            sphere * above,
+            sphere * slope / (2.0 * 2f64.sqrt()) * gauss,
+            sphere * slope * slope * nu * gauss / (2.0 * TAU.powf(1.5)) + 2.0 * above,
+        ];
+        for i in 0..3 {
+            let error = ((square[i] - mean[i] * mean[i]) / (realisations - 1) as f64).sqrt();
+            // Linear interpolation shortens contours by up to a per cent here.
+            let allowed = 4.0 * error + [0.002, 0.015 * expected[1], 0.03 * expected[2].abs()][i];
+            assert!((mean[i] - expected[i]).abs() < allowed, "ν = {nu}, W{i}: {} ± {error}, not {}", mean[i], expected[i]);
+        }
+    }
+}
+
+/// ½ erfc(ν/√2), by Simpson's rule.
+fn upper_tail(nu: f64) -> f64 {
+    let f = |x: f64| (-x * x / 2.0).exp() / TAU.sqrt();
+    let (n, top) = (2000, 10.0);
+    let h = (top - nu) / f64::from(n);
+    let weight = |i: i32| if i == 0 || i == n { 1.0 } else if i % 2 == 1 { 4.0 } else { 2.0 };
+    (0..=n).map(|i| weight(i) * f(nu + h * f64::from(i))).sum::<f64>() * h / 3.0
+}
