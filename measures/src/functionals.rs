@@ -1,0 +1,44 @@
+//! Minkowski functionals of the body in a window, and the trace of the tensors.
+
+use crate::Needs;
+use crate::registry::Kind;
+
+/// Area.
+pub(crate) const W0: Kind = Kind {
+    pattern: "w0",
+    rank: Some(0),
+    unit: "sr",
+    definition: "W0, area of the body in the window",
+    needs: |_| Needs { area: true, ..Needs::default() },
+    evaluate: |_, w| Some(w.rescaled(w.area)),
+};
+
+/// Length.
+pub(crate) const W1: Kind = Kind {
+    pattern: "w1",
+    rank: Some(0),
+    unit: "rad",
+    definition: "W1, length of the contour in the window",
+    needs: |_| Needs { length: true, ..Needs::default() },
+    evaluate: |_, w| Some(w.rescaled(w.length)),
+};
+
+/// Total curvature.
+pub(crate) const W2: Kind = Kind {
+    pattern: "w2",
+    rank: Some(0),
+    unit: "rad",
+    definition: "W2, total geodesic curvature of the contour in the window",
+    needs: |_| Needs { curvature: true, ..Needs::default() },
+    evaluate: |_, w| Some(w.rescaled(w.curvature)),
+};
+
+/// Trace of the even-rank tensors.
+pub(crate) const TRACE: Kind = Kind {
+    pattern: "trace",
+    rank: Some(2),
+    unit: "rad",
+    definition: "trace of the tensors of even rank, ψ_0",
+    needs: |_| Needs { ranks: vec![0], ..Needs::default() },
+    evaluate: |_, w| Some(w.rescaled(w.psi0)),
+};

@@ -1,0 +1,173 @@
+//! The list of built-in measures, and finding one by its name.
+//!
+//! Command line, `longan measures` and the documentation all read this list.
+
+use crate::{Measure, Needs, Window, coverage, functionals, irreducible, rank2, rank4};
+
+/// A built-in measure, or a family of them with a rank N in its name.
+#[derive(Debug)]
+pub struct Kind {
+    /// The name; `N` stands for any rank from 1.
+    pub pattern: &'static str,
+    /// The rank of the tensor; in a family, `None`.
+    pub rank: Option<u32>,
+    /// Unit, as [`Measure::unit`].
+    pub unit: &'static str,
+    /// Definition, as [`Measure::definition`], with `N` for the rank of a family.
+    pub definition: &'static str,
+    /// Moments needed, for a rank.
+    pub needs: fn(u32) -> Needs,
+    /// The measure, for a rank.
+    pub evaluate: fn(u32, &Window<'_>) -> Option<f64>,
+}
+
+/// All built-in measures.
+pub const BUILT_INS: &[&Kind] = &[
+    &functionals::W0,
+    &functionals::W1,
+    &functionals::W2,
+    &functionals::TRACE,
+    &rank2::EVQ,
+    &rank2::EVQ_DIRECTION,
+    &irreducible::PSI,
+    &irreducible::PSI_DIRECTION,
+    &irreducible::Q,
+    &rank4::MIN,
+    &rank4::MID,
+    &rank4::MAX,
+    &rank4::NORM,
+    &coverage::MASKED_FRACTION,
+    &coverage::CONTOUR_LENGTH,
+];
+
+/// One measure of the built-in kinds.
+#[derive(Clone, Copy, Debug)]
+pub struct BuiltIn {
+    kind: &'static Kind,
+    rank: u32,
+}
+
+impl Measure for BuiltIn {
+    fn name(&self) -> String {
+        self.with_rank(self.kind.pattern)
+    }
+
+    fn definition(&self) -> String {
+        self.with_rank(self.kind.definition)
+    }
+
+    fn unit(&self) -> &str {
+        self.kind.unit
+    }
+
+    fn rank(&self) -> u32 {
+        self.rank
+    }
+
+    fn needs(&self) -> Needs {
+        (self.kind.needs)(self.rank)
+    }
+
+    fn evaluate(&self, window: &Window<'_>) -> Option<f64> {
+        (self.kind.evaluate)(self.rank, window)
+    }
+}
+
+impl AsRef<dyn Measure> for BuiltIn {
+    fn as_ref(&self) -> &(dyn Measure + 'static) {
+        self
+    }
+}
+
+impl BuiltIn {
+    /// The measure of this kind; `rank` counts only for a family.
+    pub fn new(kind: &'static Kind, rank: u32) -> Self {
+        BuiltIn { kind, rank: kind.rank.unwrap_or(rank) }
+    }
+
+    fn with_rank(&self, text: &str) -> String {
+        if self.kind.rank.is_some() { text.to_owned() } else { text.replace('N', &self.rank.to_string()) }
+    }
+}
+
+/// A name that no measure has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no measure '{name}'{}; `longan measures` lists them all", nearest.as_ref().map(|n| format!(" (did you mean '{n}'?)")).unwrap_or_default())]
+pub struct UnknownMeasure {
+    /// What was asked for.
+    pub name: String,
+    /// The name most like it, if one is.
+    pub nearest: Option<String>,
+}
+
+/// The built-in measure of this name.
+///
+/// # Errors
+/// [`UnknownMeasure`], with the nearest name.
+pub fn find(name: &str) -> Result<BuiltIn, UnknownMeasure> {
+    BUILT_INS.iter().find_map(|&kind| named(kind, name)).ok_or_else(|| {
+        let rank: String = name.chars().filter(char::is_ascii_digit).collect();
+        let nearest = BUILT_INS
+            .iter()
+            .map(|kind| kind.pattern.replace('N', if rank.is_empty() { "2" } else { &rank }))
+            .map(|known| (strsim::damerau_levenshtein(&known, name), known))
+            .min()
+            .filter(|(distance, known)| 2 * distance <= known.len())
+            .map(|(_, known)| known);
+        UnknownMeasure { name: name.to_owned(), nearest }
+    })
+}
+
+fn named(kind: &'static Kind, name: &str) -> Option<BuiltIn> {
+    if let Some(rank) = kind.rank {
+        return (kind.pattern == name).then_some(BuiltIn { kind, rank });
+    }
+    let (before, after) = kind.pattern.split_once('N')?;
+    let digits = name.strip_prefix(before)?.strip_suffix(after)?;
+    let rank: u32 = digits.parse().ok()?;
+    (rank > 0 && rank.to_string() == digits).then_some(BuiltIn { kind, rank })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found() {
+        for name in ["w0", "evq-direction", "psi1", "psi17-direction", "q2", "rank4-mid", "contour-length"] {
+            assert_eq!(find(name).unwrap().name(), name);
+        }
+        assert_eq!(find("psi12-direction").unwrap().column(), "PSI12_DIRECTION");
+        assert_eq!(find("psi4").unwrap().rank(), 4);
+    }
+
+    #[test]
+    fn others_are_not_but_the_nearest_is_named() {
+        let nearest = |name: &str| find(name).unwrap_err().nearest;
+        assert_eq!(nearest("evk").as_deref(), Some("evq"));
+        assert_eq!(nearest("psi3-directon").as_deref(), Some("psi3-direction"));
+        for name in ["psi0", "psi", "psi-1", "psi02", "psi99999999999", "EVQ", "", "psi2x", "psiN"] {
+            assert!(find(name).is_err(), "{name}");
+        }
+        assert_eq!(nearest("temperature"), None);
+    }
+
+    #[test]
+    fn the_list_is_in_order() {
+        for (i, kind) in BUILT_INS.iter().enumerate() {
+            assert!(!kind.definition.is_empty() && !kind.definition.contains('\n'), "{}", kind.pattern);
+            assert!(["sr", "rad", "deg", ""].contains(&kind.unit), "{}", kind.pattern);
+            assert_eq!(kind.rank.is_none(), kind.pattern.contains('N'), "{}", kind.pattern);
+            assert!(BUILT_INS[..i].iter().all(|other| other.pattern != kind.pattern), "{} twice", kind.pattern);
+        }
+    }
+
+    #[test]
+    fn every_built_in_keeps_the_contract() {
+        for kind in BUILT_INS {
+            for rank in [1, 2, 3, 8] {
+                crate::testing::check(&BuiltIn::new(kind, rank));
+            }
+        }
+    }
+}

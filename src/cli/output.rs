@@ -1,0 +1,118 @@
+//! Minkowski maps as FITS files: columns, and in the header what was done.
+
+use std::path::Path;
+
+use longan::formats::{Card, CardValue, Column, CoordinateSystem, Extension, HealpixFile, Map, Ordering};
+use longan::measures::Measure;
+use longan::statistics::statistics;
+use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
+
+use super::options::Input;
+
+/// What is said in the header about a map and its analysis.
+pub(crate) struct Provenance<'a> {
+    /// The input file.
+    pub(crate) path: &'a Path,
+    /// The field analysed.
+    pub(crate) map: &'a Map,
+    /// Where it came from.
+    pub(crate) input: &'a Input,
+    /// What was done with it.
+    pub(crate) analysis: &'a Analysis,
+    /// The command that did it.
+    pub(crate) command: String,
+}
+
+/// A header entry.
+pub(crate) fn card(key: &str, value: CardValue, comment: &str) -> Card {
+    Card { key: key.to_owned(), value, comment: comment.to_owned() }
+}
+
+/// A text entry.
+pub(crate) fn text(key: &str, value: impl Into<String>, comment: &str) -> Card {
+    card(key, CardValue::Text(value.into()), comment)
+}
+
+/// A real entry.
+pub(crate) fn real(key: &str, value: f64, comment: &str) -> Card {
+    card(key, CardValue::Real(value), comment)
+}
+
+/// An integer entry.
+pub(crate) fn integer(key: &str, value: usize, comment: &str) -> Card {
+    card(key, CardValue::Integer(value as i64), comment)
+}
+
+/// Name and version of this program.
+pub(crate) fn creator() -> Card {
+    text("CREATOR", concat!("longan ", env!("CARGO_PKG_VERSION")), "program that wrote this file")
+}
+
+impl Provenance<'_> {
+    /// A file of these maps, one extension each.
+    pub(crate) fn file(
+        &self,
+        maps: Vec<MinkowskiMaps>,
+        measures: &[impl Measure],
+        ordering: Ordering,
+        float32: bool,
+    ) -> HealpixFile {
+        let sequence = maps.len() > 1;
+        let grid = maps[0].grid;
+        let extensions = maps.into_iter().enumerate().map(|(i, maps)| {
+            let columns = measures.iter().zip(maps.values);
+            Extension {
+                name: if sequence { format!("THRESHOLD {}", i + 1) } else { "MINKOWSKI MAP".to_owned() },
+                cards: self.cards(maps.thresholds.values()),
+                history: Vec::new(),
+                columns: columns
+                    .map(|(measure, values)| Column { name: measure.column(), unit: measure.unit().to_owned(), values })
+                    .collect(),
+            }
+        });
+        HealpixFile { grid, ordering, coordinates: self.coordinates(), float32, extensions: extensions.collect() }
+    }
+
+    fn coordinates(&self) -> Option<CoordinateSystem> {
+        self.map.coordinates
+    }
+
+    fn cards(&self, thresholds: &[f64]) -> Vec<Card> {
+        let (map, analysis) = (self.map, self.analysis);
+        let mut cards = vec![
+            creator(),
+            text("INFILE", self.path.to_string_lossy(), "file analysed"),
+            text("INFIELD", map.name.clone(), "field analysed"),
+            text("INUNIT", map.unit.clone().unwrap_or_default(), "its unit"),
+            integer("INNSIDE", map.grid().nside(), "its Nside"),
+        ];
+        if let Some(mask) = &self.input.mask {
+            cards.push(text("MASKFILE", mask.to_string_lossy(), "mask"));
+            if let Some(field) = &self.input.mask_field {
+                cards.push(text("MASKFLD", field.to_string().trim_matches('\''), "field of the mask"));
+            }
+            cards.push(real("MASKTHR", self.input.mask_threshold, "masked below this mask value"));
+        }
+        if let Some(of_map) = statistics(map.values()) {
+            cards.push(real("INMEAN", of_map.mean, "mean of the unmasked pixels"));
+            cards.push(real("INSIGMA", of_map.sigma, "their standard deviation"));
+        }
+        cards.extend([
+            real("WINDOW", analysis.window, "[deg] radius of the window, 0: the pixel itself"),
+            real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
+            text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
+            text("WEIGHT", if analysis.weight == Weight::Length { "length" } else { "curvature" }, "W_1 or W_2 tensors"),
+            text(
+                "THRUNIT",
+                if analysis.threshold_unit == ThresholdUnit::Sigma { "sigma" } else { "value" },
+                "unit in which thresholds were given",
+            ),
+            integer("NTHRESH", thresholds.len(), "number of thresholds averaged over"),
+        ]);
+        for (i, threshold) in thresholds.iter().enumerate() {
+            cards.push(real(&format!("THR{}", i + 1), *threshold, "threshold, in the unit of the field"));
+        }
+        cards.push(text("COMMAND", self.command.clone(), "command that made this file"));
+        cards
+    }
+}

@@ -1,0 +1,186 @@
+//! `longan simulate`: maps whose shape is known.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use longan::formats::{self, Card, Column, Extension, Healpix, HealpixFile, Map, Ordering};
+use longan::simulate::{Body, Edge, Shape, Waves, scene, shapes};
+
+use super::options::{Running, between};
+use super::output::{creator, integer, real, text};
+
+/// A map whose shape is known: bodies of simple outline, or a Gaussian random field.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  longan simulate shapes -o shapes.fits
+  longan simulate shapes -o cap.fits --shape cap --centre 30,45 --size 6 --edge smooth --nside 256
+  longan simulate waves -o field.fits --correlation 3 --seed 7")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand, Debug)]
+enum What {
+    Shapes(ShapesArguments),
+    Waves(WavesArguments),
+}
+
+/// Where the map goes.
+#[derive(Args, Debug)]
+struct Output {
+    /// FITS file to write.
+    #[arg(long, short, value_name = "OUT")]
+    output: PathBuf,
+    /// Nside of the map.
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = nside)]
+    nside: usize,
+    /// Replace an existing output.
+    #[arg(long)]
+    overwrite: bool,
+    #[command(flatten)]
+    running: Running,
+}
+
+/// Bodies of the paper's outlines: 1 inside and 0 outside, or the distance to the edge.
+///
+/// Without --shape all of them, 45 degrees apart along the equator from longitude -135: square (4 degrees wide), 2:1
+/// and 3:1 rectangle, cross, triangle, parallelogram and cap (all 6 degrees).
+#[derive(Args, Debug)]
+struct ShapesArguments {
+    /// One body of this outline only.
+    #[arg(long, value_name = "NAME", value_parser = Shape::ALL.map(Shape::name))]
+    shape: Option<String>,
+    /// Centre of that body: longitude and latitude in degrees.
+    #[arg(long, value_name = "LON,LAT", default_value = "0,0", allow_hyphen_values = true, value_parser = point)]
+    centre: (f64, f64),
+    /// Its size in degrees: the longer side, or the diameter.
+    #[arg(long, value_name = "DEG", default_value_t = 6.0, value_parser = |t: &str| between(t, 0.0, 90.0))]
+    size: f64,
+    /// Angle by which it is turned from north towards east, in degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    angle: f64,
+    /// Binary: 1 or 0 by the pixel's centre, to be contoured at 0.5. Smooth: the distance to the edge in degrees,
+    /// positive inside, to be contoured at 0.
+    #[arg(long, value_name = "EDGE", default_value = "binary")]
+    edge: EdgeOption,
+    #[command(flatten)]
+    output: Output,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum EdgeOption {
+    Binary,
+    Smooth,
+}
+
+/// An isotropic Gaussian random field, the sum of random plane waves in space, taken on the sphere.
+///
+/// Its mean is 0 and its standard deviation sigma0 is 1. Two points at a chord r correlate as exp(-r^2/(2 l^2)) with
+/// l the correlation angle, so sigma1 = sqrt(2)/l is the standard deviation of the gradient.
+#[derive(Args, Debug)]
+struct WavesArguments {
+    /// Correlation angle in degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = |t: &str| between(t, 0.0, 90.0))]
+    correlation: f64,
+    /// Seed; the same gives the same field.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    output: Output,
+}
+
+fn nside(text: &str) -> Result<usize, String> {
+    let nside = text.parse().map_err(|_| "not a whole number".to_owned())?;
+    Healpix::new(nside).map(Healpix::nside).map_err(|e| e.to_string())
+}
+
+fn point(text: &str) -> Result<(f64, f64), String> {
+    let (lon, lat) = text.split_once(',').ok_or("not of the form LON,LAT")?;
+    Ok((between(lon.trim(), -360.0, 360.0)?, between(lat.trim(), -90.0, 90.0)?))
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    match &arguments.what {
+        What::Shapes(arguments) => arguments.run(),
+        What::Waves(arguments) => arguments.run(),
+    }
+}
+
+impl ShapesArguments {
+    fn run(&self) -> anyhow::Result<()> {
+        let edge = match self.edge {
+            EdgeOption::Binary => Edge::Binary,
+            EdgeOption::Smooth => Edge::Smooth,
+        };
+        let (bodies, what) = match &self.shape {
+            Some(name) => {
+                let shape: Shape = name.parse()?;
+                let (lon, lat) = self.centre;
+                let what = format!("{name} of {} deg at {lon},{lat}, turned by {} deg", self.size, self.angle);
+                (vec![Body::new(shape, lon, lat, self.size, self.angle)?], what)
+            }
+            None => (scene(), "all shapes along the equator".to_owned()),
+        };
+        let contour = text("CONTOUR", if edge == Edge::Binary { "0.5" } else { "0" }, "threshold of the outline");
+        self.output.write(|grid| shapes(grid, &bodies, edge), vec![text("SHAPES", what, "bodies"), contour])
+    }
+}
+
+impl WavesArguments {
+    fn run(&self) -> anyhow::Result<()> {
+        let waves = Waves::new(self.correlation, self.seed)?;
+        let cards = waves_cards(&waves, self.correlation, self.seed);
+        if let Some(warning) = waves.warning(Healpix::new(self.output.nside)?) {
+            eprintln!("longan: {warning}");
+        }
+        self.output.write(|grid| waves.map(grid), cards)?;
+        if !self.output.running.quiet {
+            println!("sigma0 = {}, sigma1 = {} per radian", waves.sigma0(), waves.sigma1());
+        }
+        Ok(())
+    }
+}
+
+/// What the header of a simulated field says.
+pub(crate) fn waves_cards(waves: &Waves, correlation: f64, seed: u64) -> Vec<Card> {
+    vec![
+        real("CORRANG", correlation, "[deg] correlation angle"),
+        integer("SEED", seed as usize, "seed"),
+        real("SIGMA0", waves.sigma0(), "standard deviation of the field"),
+        real("SIGMA1", waves.sigma1(), "[1/rad] standard deviation of its gradient"),
+    ]
+}
+
+/// A file of one map.
+pub(crate) fn file(map: &Map, mut cards: Vec<Card>) -> HealpixFile {
+    cards.insert(0, creator());
+    let column = Column {
+        name: map.name.to_uppercase(),
+        unit: map.unit.clone().unwrap_or_default(),
+        values: map.values().to_vec(),
+    };
+    let extension =
+        Extension { name: "SIMULATION".to_owned(), cards, history: Vec::new(), columns: vec![column] };
+    HealpixFile {
+        grid: map.grid(),
+        ordering: Ordering::Ring,
+        coordinates: None,
+        float32: false,
+        extensions: vec![extension],
+    }
+}
+
+impl Output {
+    fn write(&self, make: impl FnOnce(Healpix) -> Map, cards: Vec<Card>) -> anyhow::Result<()> {
+        self.running.start()?;
+        formats::check_writable(&self.output, self.overwrite)?;
+        let map = make(Healpix::new(self.nside)?);
+        formats::write_healpix(&self.output, &file(&map, cards), self.overwrite)?;
+        if !self.running.quiet {
+            println!("{}: {} at Nside {}", self.output.display(), map.name, self.nside);
+        }
+        Ok(())
+    }
+}

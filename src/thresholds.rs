@@ -1,0 +1,167 @@
+//! Sets of thresholds: how they are written, spaced and brought to the field's own unit.
+
+use std::str::FromStr;
+
+/// The largest number of thresholds in a set; bins are 16 bit wide and one value is kept for masked pixels.
+pub const THRESHOLDS_MAX: usize = u16::MAX as usize - 1;
+
+/// Finite, distinct thresholds in ascending order, in the unit of the field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thresholds(Vec<f64>);
+
+/// What is wrong with a set of thresholds.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ThresholdError {
+    /// Neither a list nor a range.
+    #[error("thresholds '{text}' are not of the form lo:hi:n, log:lo:hi:n or a,b,c with finite numbers")]
+    Syntax {
+        /// What was given.
+        text: String,
+    },
+    /// A range that does not ascend or has too few steps for its ends.
+    #[error("thresholds '{text}' need lo < hi and at least 2 steps")]
+    Range {
+        /// What was given.
+        text: String,
+    },
+    /// Logarithmic spacing from zero or below.
+    #[error("thresholds '{text}' cannot be spaced logarithmically: lo must be above 0")]
+    Logarithm {
+        /// What was given.
+        text: String,
+    },
+    /// No threshold at all.
+    #[error("no threshold is given")]
+    Empty,
+    /// Too many thresholds.
+    #[error("{count} thresholds are more than the {THRESHOLDS_MAX} that one run takes")]
+    TooMany {
+        /// How many were given.
+        count: usize,
+    },
+    /// The same threshold twice.
+    #[error("threshold {value} is given twice")]
+    Repeated {
+        /// The value.
+        value: f64,
+    },
+    /// A threshold that is NaN or infinite.
+    #[error("threshold {value} is not a finite number")]
+    NotFinite {
+        /// The value.
+        value: f64,
+    },
+}
+
+impl Thresholds {
+    /// A set of these values, sorted.
+    ///
+    /// # Errors
+    /// Where a value is not finite or given twice, or where there is none or more than [`THRESHOLDS_MAX`].
+    pub fn new(mut values: Vec<f64>) -> Result<Self, ThresholdError> {
+        if let Some(&value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(ThresholdError::NotFinite { value });
+        }
+        values.sort_by(f64::total_cmp);
+        match values.windows(2).find(|w| w[0] == w[1]) {
+            Some(w) => Err(ThresholdError::Repeated { value: w[0] }),
+            None if values.is_empty() => Err(ThresholdError::Empty),
+            None if values.len() > THRESHOLDS_MAX => Err(ThresholdError::TooMany { count: values.len() }),
+            None => Ok(Thresholds(values)),
+        }
+    }
+
+    /// The paper's set: 13 from −3 to 3, to be taken in standard deviations.
+    pub fn standard() -> Self {
+        Thresholds((-6..=6).map(|i| f64::from(i) / 2.0).collect())
+    }
+
+    /// The thresholds mean + x · σ for each x of this set.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), in particular for a field without variance.
+    pub fn in_units_of(&self, mean: f64, sigma: f64) -> Result<Self, ThresholdError> {
+        Self::new(self.0.iter().map(|x| mean + x * sigma).collect())
+    }
+
+    /// The values, ascending.
+    pub fn values(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+/// `lo:hi:n` (n values, evenly spaced, both ends included), `log:lo:hi:n` (evenly in the logarithm) or `a,b,c`.
+impl FromStr for Thresholds {
+    type Err = ThresholdError;
+
+    fn from_str(text: &str) -> Result<Self, ThresholdError> {
+        let syntax = || ThresholdError::Syntax { text: text.to_owned() };
+        let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(syntax);
+        if !text.contains(':') {
+            return Self::new(text.split(',').map(number).collect::<Result<_, _>>()?);
+        }
+        let (range, logarithmic) = match text.trim().strip_prefix("log:") {
+            Some(rest) => (rest, true),
+            None => (text, false),
+        };
+        let [lo, hi, n] = range.split(':').collect::<Vec<_>>()[..] else { return Err(syntax()) };
+        let (lo, hi) = (number(lo)?, number(hi)?);
+        let n: usize = n.trim().parse().map_err(|_| syntax())?;
+        if n < 2 || lo >= hi {
+            return Err(ThresholdError::Range { text: text.to_owned() });
+        }
+        if n > THRESHOLDS_MAX {
+            return Err(ThresholdError::TooMany { count: n });
+        }
+        if logarithmic && lo <= 0.0 {
+            return Err(ThresholdError::Logarithm { text: text.to_owned() });
+        }
+        let between = |a: f64, b: f64, i: usize| a + (b - a) * i as f64 / (n - 1) as f64;
+        Self::new(
+            (0..n)
+                .map(|i| match i {
+                    0 => lo,
+                    _ if i == n - 1 => hi,
+                    _ if logarithmic => between(lo.ln(), hi.ln(), i).exp(),
+                    _ => between(lo, hi, i),
+                })
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(text: &str) -> Result<Vec<f64>, ThresholdError> {
+        text.parse::<Thresholds>().map(|t| t.values().to_vec())
+    }
+
+    #[test]
+    fn every_way_of_writing_is_read() {
+        assert_eq!(set("-3:3:13").unwrap(), Thresholds::standard().values());
+        assert_eq!(set("-1:0:2").unwrap(), [-1.0, 0.0]);
+        assert_eq!(set("3,-1e-3, 2").unwrap(), [-1e-3, 2.0, 3.0]);
+        assert_eq!(set("-0.5").unwrap(), [-0.5]);
+        let log = set("log:1e-2:100:5").unwrap();
+        for (a, b) in log.iter().zip([0.01, 0.1, 1.0, 10.0, 100.0]) {
+            assert!((a / b - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn every_mistake_is_named() {
+        for text in ["", "a", "1:2", "1:2:3:4", "1:2:x", "nan", "1,inf", "1,,2", "log:1:2", "1:2:-3"] {
+            assert!(matches!(set(text), Err(ThresholdError::Syntax { .. })), "{text}");
+        }
+        for text in ["1:1:3", "2:1:3", "0:1:1", "0:1:0"] {
+            assert!(matches!(set(text), Err(ThresholdError::Range { .. })), "{text}");
+        }
+        assert!(matches!(set("log:0:1:3"), Err(ThresholdError::Logarithm { .. })));
+        assert!(matches!(set("1,2,1"), Err(ThresholdError::Repeated { .. })));
+        assert!(matches!(set("0:1:99999999999"), Err(ThresholdError::TooMany { .. })));
+        assert!(matches!(Thresholds::standard().in_units_of(1.0, 0.0), Err(ThresholdError::Repeated { .. })));
+    }
+}
