@@ -35,6 +35,7 @@ mod analysis;
 pub mod cells;
 pub mod contour;
 pub mod moments;
+pub mod picture;
 pub mod simulate;
 pub mod statistics;
 pub mod thresholds;
