@@ -266,11 +266,13 @@ fn draw_lines(canvas: &Canvas<'_>, place: &Place<'_>, layout: &Layout) -> Result
         points.collect::<Vec<_>>()
     });
     for line in meridians.chain(parallels) {
-        let shown =
-            line.iter().filter_map(|(theta, phi)| place.projection.forward(theta.to_radians(), phi.to_radians()));
-        let points: Vec<_> = shown.map(|p| place.pixel(p)).collect();
+        let at = |(theta, phi): (f64, f64)| place.projection.forward(theta.to_radians(), phi.to_radians());
+        let points: Vec<_> = line.into_iter().map(|point| at(point).map(|p| place.pixel(p))).collect();
         let style = ShapeStyle { color: WHITE.mix(0.45), filled: false, stroke_width: thin };
-        canvas.draw(&PathElement::new(points, style)).map_err(failed)?;
+        for shown in points.split(Option::is_none) {
+            let shown: Vec<_> = shown.iter().flatten().copied().collect();
+            canvas.draw(&PathElement::new(shown, style)).map_err(failed)?;
+        }
     }
     let outline = place.projection.outline().into_iter().map(|p| place.pixel(p)).collect();
     draw_closed(canvas, outline, INK.stroke_width((2 * thin).max(SUPERSAMPLING as u32)))
