@@ -98,13 +98,17 @@ pub enum AnalysisError {
     #[error("every pixel of the map is masked")]
     AllMasked,
     /// Thresholds in σ of a field that has none.
-    #[error("the unmasked pixels all have the value {value}, so thresholds cannot be counted in standard deviations; give them in the map's unit")]
+    #[error(
+        "the unmasked pixels all have the value {value}, so thresholds cannot be counted in standard deviations; give them in the map's unit"
+    )]
     Constant {
         /// The value.
         value: f64,
     },
     /// Values too large for a mean.
-    #[error("the mean or standard deviation of the map is not finite, so thresholds cannot be counted in standard deviations; give them in the map's unit")]
+    #[error(
+        "the mean or standard deviation of the map is not finite, so thresholds cannot be counted in standard deviations; give them in the map's unit"
+    )]
     NotFinite,
     /// Thresholds that do not work out.
     #[error(transparent)]

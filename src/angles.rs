@@ -26,7 +26,8 @@ pub(crate) fn from_sin_cos(sin: f64, cos: f64) -> f64 {
     }
     // The series of the arc sine.
     let ss = sin * sin;
-    let series = ss * (1.0 / 6.0 + ss * (3.0 / 40.0 + ss * (5.0 / 112.0 + ss * (35.0 / 1152.0 + ss * (63.0 / 2816.0)))));
+    let series =
+        ss * (1.0 / 6.0 + ss * (3.0 / 40.0 + ss * (5.0 / 112.0 + ss * (35.0 / 1152.0 + ss * (63.0 / 2816.0)))));
     sin + sin * series
 }
 

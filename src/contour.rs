@@ -98,7 +98,12 @@ pub struct Segment<'a> {
 
 impl<'a> Segment<'a> {
     #[inline(always)]
-    fn new(geometry: &'a Geometry, (from_edge, from): (usize, DVec3), (to_edge, to): (usize, DVec3), body: Body) -> Self {
+    fn new(
+        geometry: &'a Geometry,
+        (from_edge, from): (usize, DVec3),
+        (to_edge, to): (usize, DVec3),
+        body: Body,
+    ) -> Self {
         let cross = to.cross(from);
         let sin = cross.length();
         let normal = cross * (if body == Body::Above { 1.0 } else { -1.0 } / sin);

@@ -36,6 +36,7 @@ mod angles;
 pub mod cells;
 pub mod contour;
 pub mod moments;
+pub mod picture;
 pub mod simulate;
 pub mod statistics;
 pub mod thresholds;

@@ -99,8 +99,7 @@ pub fn at_pixels(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Vec
         let len = field.grid().ring(i).len;
         RingMoments { data: vec![0.0; layout.rows * len], len }
     });
-    let mut gather =
-        Gather { layout, first: rings.start, rings: moments.collect(), cell: vec![[0.0; 4]; layout.rows] };
+    let mut gather = Gather { layout, first: rings.start, rings: moments.collect(), cell: vec![[0.0; 4]; layout.rows] };
     // A pixel's cells lie on its own ring and the two beside it.
     march_into(field, rings.start - 1..rings.end + 1, &mut gather);
     gather.rings

@@ -24,11 +24,7 @@ pub struct RingTransport {
 impl RingTransport {
     /// From the ring of colatitude θ_x to a point of colatitude θ_w, each given as (sin θ, cos θ).
     pub fn new((sin_x, cos_x): (f64, f64), (sin_w, cos_w): (f64, f64)) -> Self {
-        RingTransport {
-            sines: sin_x * sin_w,
-            one_plus_cosines: 1.0 + cos_x * cos_w,
-            sum_of_cosines: cos_x + cos_w,
-        }
+        RingTransport { sines: sin_x * sin_w, one_plus_cosines: 1.0 + cos_x * cos_w, sum_of_cosines: cos_x + cos_w }
     }
 
     /// e^{iδ} for a difference Δφ = φ_x − φ_w of longitude; 1 at the antipode, where no geodesic is singled out.
@@ -139,9 +135,13 @@ mod tests {
 
     #[test]
     fn the_phase_is_the_vector_formula() {
-        for (tx, px, tw, pw) in
-            [(0.3, 0.2, 0.5, 1.9), (1.5, 6.0, 1.6, 0.1), (3.0, 1.0, 0.4, 3.0), (0.01, 4.0, 0.02, 0.5), (1.0, 2.0, 1.0, 2.0)]
-        {
+        for (tx, px, tw, pw) in [
+            (0.3, 0.2, 0.5, 1.9),
+            (1.5, 6.0, 1.6, 0.1),
+            (3.0, 1.0, 0.4, 3.0),
+            (0.01, 4.0, 0.02, 0.5),
+            (1.0, 2.0, 1.0, 2.0),
+        ] {
             let ((x, south, _), (w, south_w, east_w)) = (frame(tx, px), frame(tw, pw));
             let moved = south - (x + w) * (south.dot(w) / (1.0 + x.dot(w)));
             let (sin, cos) = (f64::sin(px - pw), f64::cos(px - pw));

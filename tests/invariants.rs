@@ -166,8 +166,7 @@ fn bodies_far_apart_add_up() {
     let (north, south) = (part(&|t| t < 60.0), part(&|t| t > 110.0));
     let both = part(&|t| !(60.0..=110.0).contains(&t));
     let at = thresholds(&[0.5]);
-    let [north, south, both] =
-        [north, south, both].map(|map| moments(&map, &at, Body::Above, 8, 40.0, Weight::Length));
+    let [north, south, both] = [north, south, both].map(|map| moments(&map, &at, Body::Above, 8, 40.0, Weight::Length));
     for row in 1..both.len() {
         let sum: Vec<f64> = north[row].iter().zip(&south[row]).map(|(a, b)| a + b).collect();
         assert!(difference(&both[row], &sum) < 1e-12, "row {row}");

@@ -81,9 +81,8 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     let values = run(&names);
     let fraction = column("masked_fraction");
     close("masked fraction", &filled(&values[0], 1.0), fraction);
-    let undone = |values: &[f64]| -> Vec<f64> {
-        filled(values, 0.0).iter().zip(fraction).map(|(v, f)| v * (1.0 - f)).collect()
-    };
+    let undone =
+        |values: &[f64]| -> Vec<f64> { filled(values, 0.0).iter().zip(fraction).map(|(v, f)| v * (1.0 - f)).collect() };
     close("w0", &undone(&values[1]), column("w0"));
     close("w1", &filled(&values[2], 0.0), column("w1"));
     close("w2", &undone(&values[3]), column("w2"));
@@ -95,7 +94,10 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     for (p, (got, want)) in values[4].iter().zip(column("evq")).enumerate() {
         let (psi0, psi2) = (column("w1")[p], column("psi2_re")[p].hypot(column("psi2_im")[p]));
         if psi0 - psi2 > 1e-3 * psi0 {
-            assert!((got / want - 1.0).abs() < 1e-6 * 1e-3 * psi0 / (psi0 - psi2) + 1e-8, "evq, row {p}: {got}, not {want}");
+            assert!(
+                (got / want - 1.0).abs() < 1e-6 * 1e-3 * psi0 / (psi0 - psi2) + 1e-8,
+                "evq, row {p}: {got}, not {want}"
+            );
             compared += 1;
         } else if psi0 == 0.0 {
             assert!(got.is_nan());

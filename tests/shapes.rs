@@ -86,7 +86,8 @@ fn euler_characteristics_count_components_less_holes() {
         assert!((chi - chi.round()).abs() < 1e-10);
         chi.round()
     };
-    let caps: Vec<Solid> = (0..5).map(|i| solid(Shape::Cap, 60.0 * f64::from(i), 70.0 - 30.0 * f64::from(i), 15.0)).collect();
+    let caps: Vec<Solid> =
+        (0..5).map(|i| solid(Shape::Cap, 60.0 * f64::from(i), 70.0 - 30.0 * f64::from(i), 15.0)).collect();
     for n in 1..=5 {
         assert_eq!(chi(&caps[..n], 0.0, Body::Above), n as f64);
         assert_eq!(chi(&caps[..n], 0.0, Body::Below), 2.0 - n as f64);
@@ -135,7 +136,12 @@ fn random_waves_follow_the_gaussian_curves() {
             let error = ((square[i] - mean[i] * mean[i]) / (realisations - 1) as f64).sqrt();
             // Linear interpolation shortens contours by up to a per cent here.
             let allowed = 4.0 * error + [0.002, 0.015 * expected[1], 0.03 * expected[2].abs()][i];
-            assert!((mean[i] - expected[i]).abs() < allowed, "ν = {nu}, W{i}: {} ± {error}, not {}", mean[i], expected[i]);
+            assert!(
+                (mean[i] - expected[i]).abs() < allowed,
+                "ν = {nu}, W{i}: {} ± {error}, not {}",
+                mean[i],
+                expected[i]
+            );
         }
     }
 }
@@ -145,6 +151,14 @@ fn upper_tail(nu: f64) -> f64 {
     let f = |x: f64| (-x * x / 2.0).exp() / TAU.sqrt();
     let (n, top) = (2000, 10.0);
     let h = (top - nu) / f64::from(n);
-    let weight = |i: i32| if i == 0 || i == n { 1.0 } else if i % 2 == 1 { 4.0 } else { 2.0 };
+    let weight = |i: i32| {
+        if i == 0 || i == n {
+            1.0
+        } else if i % 2 == 1 {
+            4.0
+        } else {
+            2.0
+        }
+    };
     (0..=n).map(|i| weight(i) * f(nu + h * f64::from(i))).sum::<f64>() * h / 3.0
 }

@@ -29,14 +29,16 @@ impl FromStr for Field {
 
     /// Digits are a number, all else is a name.
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(text.parse().map_or_else(|_| Field::Name(text.to_owned()), Field::Number))
+        let digits = text.bytes().all(|b| b.is_ascii_digit());
+        let number = text.parse().ok().filter(|_| digits);
+        Ok(number.map_or_else(|| Field::Name(text.to_owned()), Field::Number))
     }
 }
 
 impl fmt::Display for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Field::Name(name) => write!(f, "'{name}'"),
+            Field::Name(name) => write!(f, "'{}'", name.escape_debug()),
             Field::Number(number) => write!(f, "{number}"),
         }
     }
@@ -194,7 +196,7 @@ fn looks_like(head: &[u8]) -> &'static str {
         (b"BZh", "a bzip2-compressed file"),
         (b"\x28\xb5\x2f\xfd", "a Zstandard-compressed file"),
         (b"\xfd7zXZ\x00", "an xz-compressed file"),
-        (b"SIMPLE", "a damaged FITS file (its first line is not 'SIMPLE  ='))"),
+        (b"SIMPLE", "a damaged FITS file (it does not begin with 'SIMPLE  =')"),
     ];
     if head.is_empty() {
         return "an empty file";
@@ -205,9 +207,10 @@ fn looks_like(head: &[u8]) -> &'static str {
     if let Some((_, found)) = MAGIC.iter().find(|(magic, _)| head.starts_with(magic)) {
         return found;
     }
-    let text = |b: &u8| b.is_ascii_graphic() || b" \t\r\n".contains(b) || *b >= 0x80;
-    if std::str::from_utf8(&head[..head.len().min(512)]).is_ok_and(|_| true) && head.iter().all(text) {
-        let first_line = head.split(|b| *b == b'\n').next().unwrap_or_default();
+    // A character may be cut at the end of `head`.
+    let utf8 = std::str::from_utf8(head).map_or_else(|e| e.error_len().is_none(), |_| true);
+    if utf8 && head.iter().all(|&b| b >= b' ' || b"\t\r\n".contains(&b)) {
+        let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
         return if first_line.contains(&b',') { "a text file (perhaps CSV)" } else { "a text file" };
     }
     "a file of an unknown kind"

@@ -18,7 +18,7 @@ use crate::Error;
 /// An open FITS file.
 pub(crate) struct Fits {
     handle: *mut sys::fitsfile,
-    /// Size in bytes, uncompressed.
+    /// Size in bytes, uncompressed and without padding that was missing.
     size: u64,
     /// The bytes, where the file is in memory; freed after the handle is closed.
     _memory: Option<Box<Memory>>,
@@ -56,6 +56,9 @@ pub(crate) struct Extent {
 /// The longest path that fits into cfitsio's buffers with all that it appends there.
 const PATH_MAX: usize = 1000;
 
+/// FITS files consist of blocks of this many bytes.
+pub(crate) const BLOCK: usize = 2880;
+
 /// cfitsio's status for a keyword that is not there.
 const KEY_NO_EXIST: c_int = 202;
 
@@ -81,10 +84,12 @@ fn call(action: &'static str, function: impl FnOnce(&mut c_int)) -> Result<(), E
     Err(Error::Cfitsio { action, status, message: from_c(&text) })
 }
 
-/// The text in a buffer up to its NUL, FITS's padding removed.
+/// The text in a buffer up to its NUL, without FITS's padding and control characters. Headers should be ASCII, but
+/// units such as µK are met in UTF-8 and Latin-1.
 fn from_c(buffer: &[c_char]) -> String {
     let bytes: Vec<u8> = buffer.iter().map(|&c| c as u8).take_while(|&b| b != 0).collect();
-    String::from_utf8_lossy(&bytes).trim_end().to_owned()
+    let text = String::from_utf8(bytes).unwrap_or_else(|e| e.into_bytes().into_iter().map(char::from).collect());
+    text.trim_end().replace(char::is_control, " ")
 }
 
 /// A path as cfitsio takes it literally.
@@ -97,7 +102,7 @@ fn c_path(path: &Path) -> Result<CString, Error> {
     if bytes.len() > PATH_MAX {
         return Err(Error::PathTooLong { bytes: bytes.len(), limit: PATH_MAX });
     }
-    CString::new(bytes).map_err(|_| Error::PathNul)
+    CString::new(bytes).map_err(|e| Error::Io { action: "open it", cause: e.into() })
 }
 
 /// Text for cfitsio; callers have made it printable ASCII.
@@ -119,8 +124,10 @@ impl Fits {
         Ok(Fits { handle, size, _memory: None })
     }
 
-    /// Opens an uncompressed file that is in memory.
+    /// Opens an uncompressed file that is in memory; the padding of its last block may be missing.
     pub(crate) fn open_memory(mut bytes: Vec<u8>) -> Result<Self, Error> {
+        let size = bytes.len() as u64;
+        bytes.resize(bytes.len().next_multiple_of(BLOCK), 0);
         let (start, len) = (bytes.as_mut_ptr().cast(), bytes.len());
         let mut memory = Box::new(Memory { _bytes: bytes, start, len });
         let mut handle = ptr::null_mut();
@@ -129,7 +136,7 @@ impl Fits {
         call("open it", |status| unsafe {
             sys::ffomem(&mut handle, c"longan".as_ptr(), 0, &mut memory.start, &mut memory.len, 0, None, status);
         })?;
-        Ok(Fits { handle, size: len as u64, _memory: Some(memory) })
+        Ok(Fits { handle, size, _memory: Some(memory) })
     }
 
     /// Creates a file, which must not exist.
@@ -237,7 +244,8 @@ impl Fits {
     ) -> Result<(), Error> {
         // To cfitsio, 0 means not to look for nulls.
         let null = if nulls { f64::NAN } else { 0.0 };
-        // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails.
+        let mut any = 0;
+        // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails, and sets `any`.
         call("read a column", |status| unsafe {
             sys::ffgcvd(
                 self.handle,
@@ -247,7 +255,7 @@ impl Fits {
                 out.len() as i64,
                 null,
                 out.as_mut_ptr(),
-                ptr::null_mut(),
+                &mut any,
                 status,
             );
         })
@@ -260,7 +268,8 @@ impl Fits {
         (row, element): (usize, usize),
         out: &mut [i64],
     ) -> Result<(), Error> {
-        // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails.
+        let mut any = 0;
+        // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails, and sets `any`.
         call("read a column of integers", |status| unsafe {
             sys::ffgcvjj(
                 self.handle,
@@ -270,7 +279,7 @@ impl Fits {
                 out.len() as i64,
                 0,
                 out.as_mut_ptr(),
-                ptr::null_mut(),
+                &mut any,
                 status,
             );
         })

@@ -1,7 +1,7 @@
 //! What can be wrong with a map or a file of one, each said in one sentence with its remedy.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What can be wrong with a map or a file of one.
 ///
@@ -39,7 +39,7 @@ pub enum Error {
     },
 
     /// A problem with a particular file. The problem is part of the message and therefore not a `source`.
-    #[error("{}: {problem}", path.display())]
+    #[error("{}: {problem}", shown(path))]
     File {
         /// The file, as it was named.
         path: PathBuf,
@@ -73,9 +73,6 @@ pub enum Error {
         /// The longest path that can be used.
         limit: usize,
     },
-    /// A name that no file can have.
-    #[error("the path holds a NUL character, which no file name can; check how it was put together")]
-    PathNul,
 
     /// Not a file that any adapter reads.
     #[error("this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed; convert it first")]
@@ -113,7 +110,7 @@ pub enum Error {
     },
 
     /// A FITS file without a HEALPix table.
-    #[error("there is no HEALPix table in this FITS file: {found}")]
+    #[error("there is no HEALPix table in this FITS file ({found}); choose a file that has one")]
     NoHealpix {
         /// What each HDU is.
         found: String,
@@ -302,6 +299,12 @@ pub enum Error {
         /// The Nside asked for.
         nside: usize,
     },
+    /// A resolution that a multi-order map cannot be brought to.
+    #[error("a multi-order map can be brought to an Nside that is a power of two, from 1 to 2^29, not to {nside}")]
+    Resolution {
+        /// The Nside asked for.
+        nside: usize,
+    },
     /// More memory than there is.
     #[error("a map of Nside {nside} needs {gibibytes:.1} GiB, more memory than there is; use a coarser map")]
     Memory {
@@ -315,7 +318,7 @@ pub enum Error {
     #[error("the file exists; choose another name or allow overwriting")]
     Exists,
     /// A folder that is not there.
-    #[error("the folder {} does not exist; create it first", folder.display())]
+    #[error("the folder {} does not exist; create it first", shown(folder))]
     NoFolder {
         /// The folder.
         folder: PathBuf,
@@ -333,7 +336,7 @@ pub enum Error {
         expected: usize,
     },
     /// A header entry that FITS does not have.
-    #[error("'{key}' is not a FITS keyword, which has one to eight of A-Z, 0-9, '-' and '_'")]
+    #[error("{key:?} is not a FITS keyword, which has one to eight of A-Z, 0-9, '-' and '_'")]
     CardKey {
         /// The keyword.
         key: String,
@@ -348,7 +351,7 @@ pub enum Error {
 
 impl Error {
     /// Says which file the problem is with, unless that has been said.
-    pub(crate) fn of(self, path: &std::path::Path) -> Self {
+    pub(crate) fn of(self, path: &Path) -> Self {
         match self {
             Error::File { .. } => self,
             problem => Error::File { path: path.to_owned(), problem: Box::new(problem) },
@@ -362,4 +365,9 @@ impl Error {
             _ => Error::Io { action, cause },
         }
     }
+}
+
+/// A path on one line.
+fn shown(path: &Path) -> String {
+    path.display().to_string().replace(char::is_control, "\u{fffd}")
 }

@@ -1,7 +1,7 @@
 //! Maps on the sphere and the files that hold them.
 //!
 //! [`Map`] is what every reader makes and the engine takes; [`Healpix`] is its grid. Each family of files has an
-//! [`Adapter`], chosen by the file's content, never by its name. Writing goes through [`save`], the one place that
+//! [`Adapter`], chosen by the file's content, never by its name. Writing goes through [`save()`], the one place that
 //! puts a finished file in its place. What is done with a map is left to others.
 
 mod adapter;

@@ -22,7 +22,7 @@ pub fn save(path: &Path, overwrite: bool, write: impl FnOnce(&Path) -> Result<()
     place(path, overwrite, write).map_err(|e| e.of(path))
 }
 
-/// Whether [`save`] would be able to write this file, to be asked before a long computation.
+/// Whether [`save()`] would be able to write this file, to be asked before a long computation.
 ///
 /// # Errors
 /// [`Error::File`], which names the file, where its folder does not exist or cannot be written to, where it is a

@@ -9,7 +9,7 @@ use longan::measures::{BuiltIn, UnknownMeasure, find};
 use longan::{Analysis, Body, ThresholdUnit, Thresholds};
 
 /// Which field of a file, and which pixels of it.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct Input {
     /// Field: a column's name, or its number counted from 0 as healpy does [default: the first].

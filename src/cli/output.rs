@@ -99,7 +99,11 @@ impl Provenance<'_> {
             real("WINDOW", analysis.window, "[deg] radius of the window, 0: the pixel itself"),
             real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
             text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
-            text("WEIGHT", if analysis.weight == Weight::Length { "length" } else { "curvature" }, "W_1 or W_2 tensors"),
+            text(
+                "WEIGHT",
+                if analysis.weight == Weight::Length { "length" } else { "curvature" },
+                "W_1 or W_2 tensors",
+            ),
             text(
                 "THRUNIT",
                 if analysis.threshold_unit == ThresholdUnit::Sigma { "sigma" } else { "value" },

@@ -161,8 +161,7 @@ pub(crate) fn file(map: &Map, mut cards: Vec<Card>) -> HealpixFile {
         unit: map.unit.clone().unwrap_or_default(),
         values: map.values().to_vec(),
     };
-    let extension =
-        Extension { name: "SIMULATION".to_owned(), cards, history: Vec::new(), columns: vec![column] };
+    let extension = Extension { name: "SIMULATION".to_owned(), cards, history: Vec::new(), columns: vec![column] };
     HealpixFile {
         grid: map.grid(),
         ordering: Ordering::Ring,

@@ -88,7 +88,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         Format::Table => {
             let unit = map.unit.as_deref().map(|u| format!(" [{u}]")).unwrap_or_default();
-            let head = [format!("threshold{unit}"), "area [sr]".into(), "length [rad]".into(), "curvature [rad]".into()];
+            let head =
+                [format!("threshold{unit}"), "area [sr]".into(), "length [rad]".into(), "curvature [rad]".into()];
             writeln!(out, "{:>16} {:>14} {:>14} {:>16} {:>8}", head[0], head[1], head[2], head[3], "Euler")?;
             for r in &rows {
                 let euler = r.euler_characteristic.map(|x| x.to_string()).unwrap_or_default();

@@ -10,13 +10,13 @@ mod table;
 mod write;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
 use crate::adapter::{gunzipped_head, is_gzip};
-use crate::cfitsio::Fits;
+use crate::cfitsio::{BLOCK, Fits};
 use crate::{Adapter, Description, Error, Map, Selection};
 
 pub use write::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
@@ -51,16 +51,21 @@ impl Adapter for HealpixFits {
     }
 }
 
-/// Opens a FITS file, decompressed into memory where it is a gzip stream.
+/// Opens a FITS file: in memory where it is a gzip stream or its last block is cut, neither of which cfitsio reads
+/// reliably from disk.
 fn open(path: &Path) -> Result<Fits, Error> {
     let mut file = File::open(path).map_err(Error::io("open it"))?;
-    let mut head = Vec::new();
-    file.by_ref().take(2).read_to_end(&mut head).map_err(Error::io("read it"))?;
-    if !is_gzip(&head) {
-        return Fits::open(path);
-    }
     let mut bytes = Vec::new();
-    let stream = std::io::BufReader::with_capacity(1 << 18, head.as_slice().chain(file));
-    MultiGzDecoder::new(stream).read_to_end(&mut bytes).map_err(|cause| Error::Gzip { cause })?;
-    Fits::open_memory(bytes)
+    file.by_ref().take(2).read_to_end(&mut bytes).map_err(Error::io("read it"))?;
+    if is_gzip(&bytes) {
+        let stream = BufReader::with_capacity(1 << 18, Cursor::new(bytes).chain(file));
+        let mut bytes = Vec::new();
+        MultiGzDecoder::new(stream).read_to_end(&mut bytes).map_err(|cause| Error::Gzip { cause })?;
+        Fits::open_memory(bytes)
+    } else if file.metadata().map_err(Error::io("read it"))?.len().is_multiple_of(BLOCK as u64) {
+        Fits::open(path)
+    } else {
+        file.read_to_end(&mut bytes).map_err(Error::io("read it"))?;
+        Fits::open_memory(bytes)
+    }
 }

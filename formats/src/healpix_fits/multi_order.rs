@@ -49,8 +49,9 @@ impl Cell {
 fn place(uniq: i128) -> Option<u64> {
     let uniq = u64::try_from(uniq).ok().filter(|&uniq| uniq >= 4)?;
     let order = uniq.ilog2() / 2 - 1;
+    // Orders follow each other without gaps, so any pixel number is one of this order.
     let pixel = uniq - (1 << (2 * (order + 1)));
-    (order <= ORDER_MAX && pixel < 12 << (2 * order)).then(|| (2 * pixel + 1) << (2 * (ORDER_MAX - order)))
+    (order <= ORDER_MAX).then(|| (2 * pixel + 1) << (2 * (ORDER_MAX - order)))
 }
 
 /// Calls `each` with the place of every cell in chunks, in the table's order, and the number of the first of them.
@@ -124,14 +125,14 @@ pub(super) fn read(
 
     let finest = 1 << cells.iter().map(Cell::order).max().unwrap_or(0);
     let grid = match nside {
-        Some(nside) => Healpix::new(nside)?,
+        Some(nside) => Healpix::new(nside).ok().filter(|grid| grid.has_nested()).ok_or(Error::Resolution { nside })?,
         None if finest > UNASKED_MAX => return Err(Error::TooFine { hdu, finest, limit: UNASKED_MAX }),
         None => Healpix::new(finest)?,
     };
     let depth = u32::from(grid.depth()?);
     let mut canvas = Canvas::new(grid, Ordering::Nested)?;
     let mut run = Run { first: 0, values: Vec::with_capacity(CHUNK) };
-    let mut mean = Mean { pixel: 0, sum: 0.0, weight: 0.0 };
+    let mut mean = Mean { pixel: 0, first: 0.0, sum: 0.0, weight: 0.0 };
     for cell in &cells {
         if cell.order() <= depth {
             let children = 2 * (depth - cell.order());
@@ -146,9 +147,7 @@ pub(super) fn read(
                 mean.pixel = pixel;
             }
             if !cell.value.is_nan() {
-                let weight = 0.25f64.powi((cell.order() - depth) as i32);
-                mean.sum += weight * cell.value;
-                mean.weight += weight;
+                mean.add(cell.value, 0.25f64.powi((cell.order() - depth) as i32));
             }
         }
     }
@@ -160,14 +159,24 @@ pub(super) fn read(
 /// The mean over the cells of one pixel.
 struct Mean {
     pixel: u64,
+    first: f64,
+    /// Of the differences to the first value, so that the mean of equal values is exact.
     sum: f64,
     weight: f64,
 }
 
 impl Mean {
+    fn add(&mut self, value: f64, weight: f64) {
+        if self.weight == 0.0 {
+            self.first = value;
+        }
+        self.sum += weight * (value - self.first);
+        self.weight += weight;
+    }
+
     fn flush(&mut self, run: &mut Run, canvas: &mut Canvas) -> Result<(), Error> {
         if self.weight > 0.0 {
-            run.push(canvas, self.pixel, self.sum / self.weight)?;
+            run.push(canvas, self.pixel, self.first + self.sum / self.weight)?;
             (self.sum, self.weight) = (0.0, 0.0);
         }
         Ok(())

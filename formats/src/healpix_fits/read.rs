@@ -43,12 +43,18 @@ pub(super) struct Canvas {
 impl Canvas {
     /// A map with all pixels masked.
     pub(super) fn new(grid: Healpix, ordering: Ordering) -> Result<Self, Error> {
+        let mut canvas = Canvas::reserved(grid, ordering)?;
+        canvas.values.resize(grid.pixels(), f64::NAN);
+        Ok(canvas)
+    }
+
+    /// A map without any pixels yet, and the memory for all of them.
+    fn reserved(grid: Healpix, ordering: Ordering) -> Result<Self, Error> {
         let mut values = Vec::new();
         values.try_reserve_exact(grid.pixels()).map_err(|_| Error::Memory {
             nside: grid.nside(),
             gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
         })?;
-        values.resize(grid.pixels(), f64::NAN);
         Ok(Canvas { grid, ordering, values, places: Vec::new() })
     }
 
@@ -80,23 +86,30 @@ impl Canvas {
 
 fn implicit(fits: &mut Fits, table: &Table, column: &Column, named: Option<(usize, usize)>) -> Result<Canvas, Error> {
     let (grid, pixels) = table.implicit(column, named)?;
-    let mut canvas = Canvas::new(grid, table.ordering)?;
+    let chunks = (0..pixels.len()).step_by(CHUNK).map(|start| (start, CHUNK.min(pixels.len() - start)));
     match table.ordering {
         Ordering::Ring => {
-            for (i, chunk) in canvas.values[pixels].chunks_mut(CHUNK).enumerate() {
-                read_values(fits, table, column, i * CHUNK, chunk)?;
+            // The map grows chunk by chunk, for each to be in the cache when it is filled.
+            let mut canvas = Canvas::reserved(grid, table.ordering)?;
+            canvas.values.resize(pixels.start, f64::NAN);
+            for (start, count) in chunks {
+                let place = canvas.values.len();
+                canvas.values.resize(place + count, 0.0);
+                read_values(fits, table, column, start, &mut canvas.values[place..])?;
             }
+            canvas.values.resize(grid.pixels(), f64::NAN);
+            Ok(canvas)
         }
         Ordering::Nested => {
+            let mut canvas = Canvas::new(grid, table.ordering)?;
             let mut buffer = vec![0.0; CHUNK.min(pixels.len())];
-            for start in (0..pixels.len()).step_by(CHUNK) {
-                let chunk = &mut buffer[..CHUNK.min(pixels.len() - start)];
-                read_values(fits, table, column, start, chunk)?;
-                canvas.put_run(pixels.start + start, chunk)?;
+            for (start, count) in chunks {
+                read_values(fits, table, column, start, &mut buffer[..count])?;
+                canvas.put_run(pixels.start + start, &buffer[..count])?;
             }
+            Ok(canvas)
         }
     }
-    Ok(canvas)
 }
 
 fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, grain: usize) -> Result<Canvas, Error> {
@@ -177,11 +190,10 @@ pub(super) fn read_values(
 
 /// Makes NaN of all that means "no value": UNSEEN, the file's own marker, and what is not finite.
 fn mask(values: &mut [f64], bad_data: Option<f64>) {
+    // UNSEEN twice costs less than a branch.
     let marker = bad_data.unwrap_or(UNSEEN);
     for value in values {
-        if is_bad(*value, UNSEEN) || is_bad(*value, marker) {
-            *value = f64::NAN;
-        }
+        *value = if is_bad(*value, UNSEEN) | is_bad(*value, marker) { f64::NAN } else { *value };
     }
 }
 

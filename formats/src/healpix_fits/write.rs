@@ -80,11 +80,11 @@ pub struct HealpixFile {
 /// Values per row, as other software writes them.
 const ROW: usize = 1024;
 
-/// Writes a file through [`save`], gzip-compressed where the path ends in `.gz`.
+/// Writes a file through [`save()`], gzip-compressed where the path ends in `.gz`.
 ///
 /// # Errors
 /// [`Error::File`], which names the file, around the reason: [`Error::ColumnLength`], [`Error::CardKey`],
-/// [`Error::LongName`], [`Error::NotNested`], or those of [`save`].
+/// [`Error::LongName`], [`Error::NotNested`], or those of [`save()`].
 pub fn write_healpix(path: &Path, file: &HealpixFile, overwrite: bool) -> Result<(), Error> {
     file.check().map_err(|e| e.of(path))?;
     let compressed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
@@ -112,6 +112,7 @@ impl HealpixFile {
             self.grid.depth()?;
         }
         for extension in &self.extensions {
+            name(&extension.name)?;
             for Card { key, .. } in &extension.cards {
                 let legal = |b: u8| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
                 if key.is_empty() || key.len() > 8 || !key.bytes().all(legal) {
@@ -119,6 +120,7 @@ impl HealpixFile {
                 }
             }
             for column in &extension.columns {
+                name(&column.name).and(name(&column.unit))?;
                 if column.values.len() != self.grid.pixels() {
                     return Err(Error::ColumnLength {
                         column: column.name.clone(),
@@ -177,8 +179,7 @@ impl HealpixFile {
             match value {
                 CardValue::Text(text) => fits.write_text(key, &ascii(text), &comment)?,
                 CardValue::Real(value) if !value.is_finite() => fits.write_text(key, &value.to_string(), &comment)?,
-                // The shortest digits that give the same number again.
-                CardValue::Real(value) => fits.write_key(key, &format!("{value:?}").to_uppercase(), &comment)?,
+                CardValue::Real(value) => fits.write_key(key, &real(*value), &comment)?,
                 CardValue::Integer(value) => fits.write_key(key, &value.to_string(), &comment)?,
                 CardValue::Logical(value) => fits.write_key(key, if *value { "T" } else { "F" }, &comment)?,
             }
@@ -211,6 +212,15 @@ impl HealpixFile {
             }
         }
         Ok(())
+    }
+}
+
+/// The shortest digits that give the same number again, with a decimal point.
+fn real(value: f64) -> String {
+    let digits = format!("{value:?}").to_uppercase();
+    match digits.split_once('E') {
+        Some((mantissa, exponent)) if !mantissa.contains('.') => format!("{mantissa}.0E{exponent}"),
+        _ => digits,
     }
 }
 
