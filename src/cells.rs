@@ -137,7 +137,13 @@ impl CellRing {
         let mut geometry = Geometry { count: stencil.count, ..Geometry::default() };
         for (c, corner) in stencil.corners.iter().enumerate() {
             let ring = self.grid.ring(corner.ring);
-            let (sin_phi, cos_phi) = (ring.phi(corner.column as isize) - stencil.meridian).sin_cos();
+            let (sin_phi, cos_phi) = if self.sectors == 1 && self.ring % (4 * self.grid.nside()) == 0 {
+                // The pole's cell: its corners are the quarter turns of one another, to the last bit.
+                let half = std::f64::consts::FRAC_1_SQRT_2;
+                [(half, half), (half, -half), (-half, -half), (-half, half)][corner.column]
+            } else {
+                (ring.phi(corner.column as isize) - stencil.meridian).sin_cos()
+            };
             let (sin, cos) = (ring.sin_theta, ring.cos_theta);
             let at = [sin * cos_phi, sin * sin_phi, cos];
             geometry.corner[c] = at.into();
@@ -157,7 +163,7 @@ impl CellRing {
             let cos_arc = 1.0 - chord_sq / 2.0;
             let sin_arc = (chord_sq * (1.0 - chord_sq / 4.0)).sqrt();
             geometry.arc[c] = 2.0 * (chord_sq.sqrt() / 2.0).asin();
-            geometry.along[c] = (b - a * cos_arc) * (1.0 / sin_arc);
+            geometry.along[c] = [(b - a * cos_arc) * (1.0 / sin_arc), (b * cos_arc - a) * (1.0 / sin_arc)];
         }
         geometry
     }
@@ -183,23 +189,33 @@ pub struct Geometry {
     pub corner: [DVec3; 4],
     /// The corners and their frames, component by component.
     pub frames: Frames,
-    /// Unit tangent at each corner along the edge to the next.
-    pub along: [DVec3; 4],
+    /// Unit tangents along each edge, from its first corner to the next: at that corner, and at the next.
+    along: [[DVec3; 2]; 4],
     /// Length of that edge in radians.
-    pub arc: [f64; 4],
+    arc: [f64; 4],
 }
 
 impl Geometry {
-    /// The point at this fraction of the edge from corner `edge` to the next.
+    /// The point of an edge at a fraction, at most one half, of its length from its first corner, or with `from_end`
+    /// from the next.
     #[inline(always)]
-    pub fn point(&self, edge: usize, fraction: f64) -> DVec3 {
-        let (sin, cos) = angles::sin_cos(fraction * self.arc[edge]);
-        self.corner[edge] * cos + self.along[edge] * sin
+    pub(crate) fn point(&self, edge: usize, from_end: bool, fraction: f64) -> Point {
+        let corner = if from_end { self.next(edge) } else { edge };
+        let (at, along) = (self.corner[corner], self.along[edge][usize::from(from_end)]);
+        let (sin, versine) = angles::sin_versine(fraction * self.arc[edge]);
+        let offset = along * if from_end { -sin } else { sin } - at * versine;
+        Point { at: at + offset, corner, offset }
+    }
+
+    /// The corner after this one, which is also the end of this edge.
+    #[inline(always)]
+    pub(crate) fn next(&self, corner: usize) -> usize {
+        if corner + 1 == self.count { 0 } else { corner + 1 }
     }
 
     /// Unit normal of the edge's great circle, pointing into the cell.
     pub fn inward(&self, edge: usize) -> DVec3 {
-        self.corner[edge].cross(self.along[edge])
+        self.corner[edge].cross(self.along[edge][0])
     }
 
     /// Area of the cell in steradian.
@@ -216,23 +232,22 @@ pub fn area_of_triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     2.0 * a.dot(b.cross(c)).atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
 }
 
-/// How many triangular cells the pixels `columns` of a ring are corners of, counted once for each such pixel.
-///
-/// A pixel's four cells give it 4 · 1/4 of a cell, or 1/12 more for each triangle among them.
-pub fn triangles(grid: Healpix, ring: usize, columns: impl Iterator<Item = usize> + Clone) -> usize {
-    let n = grid.nside();
-    let at = |remainder: usize| columns.clone().filter(|c| c % n == remainder).count();
-    let mut count = 0;
-    if ring == n || ring == 3 * n {
-        count += at(0) + at(n - 1);
+/// A point near a corner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Point {
+    /// The unit vector.
+    pub(crate) at: DVec3,
+    corner: usize,
+    /// From the corner to the point: what remains exact when the two nearly coincide.
+    offset: DVec3,
+}
+
+impl Point {
+    /// The vector from another point of the cell to this one, without cancellation where both are near one corner.
+    #[inline(always)]
+    pub(crate) fn minus(&self, other: &Point) -> DVec3 {
+        if self.corner == other.corner { self.offset - other.offset } else { self.at - other.at }
     }
-    if ring == n + 1 {
-        count += at(0);
-    }
-    if ring == 3 * n - 1 {
-        count += at(0);
-    }
-    count
 }
 
 #[cfg(test)]
@@ -298,21 +313,6 @@ mod tests {
                 cell.extend([NE, E, SE].iter().filter_map(|&w| neighbours.get(w)).map(|&h| layer.to_ring(h) as usize));
                 cell.sort_unstable();
                 assert!(ours.contains(&cell), "Nside {nside}: no cell {cell:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn triangles_are_counted_where_they_are() {
-        for nside in [1, 2, 3, 8] {
-            let grid = Healpix::new(nside).unwrap();
-            let mut of_pixel = vec![0; grid.pixels()];
-            all_cells(nside).iter().filter(|c| c.0.len() == 3).flat_map(|c| &c.0).for_each(|&p| of_pixel[p] += 1);
-            for i in 1..=grid.rings() {
-                let ring = grid.ring(i);
-                for j in 0..ring.len {
-                    assert_eq!(triangles(grid, i, j..j + 1), of_pixel[ring.start + j], "Nside {nside}, ring {i}, {j}");
-                }
             }
         }
     }

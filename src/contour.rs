@@ -12,7 +12,7 @@ use longan_formats::Healpix;
 use rayon::prelude::*;
 
 use crate::angles;
-use crate::cells::{CellRing, Geometry, Pixel, area_of_triangle};
+use crate::cells::{CellRing, Geometry, Pixel, Point, area_of_triangle};
 use crate::thresholds::Thresholds;
 use crate::transport::{self, Phases};
 
@@ -74,10 +74,19 @@ impl<'a> Field<'a> {
 /// A cell as a sink sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<'a> {
+    /// The cell ring, from 0 at the north pole.
+    pub ring: usize,
     /// Corners, counter-clockwise; only the first [`count`](Self::count) are meant.
     pub pixels: &'a [Pixel; 4],
     /// Number of corners, 4 or 3.
     pub count: usize,
+}
+
+/// Where the contour crosses an edge.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    edge: usize,
+    point: Point,
 }
 
 /// A piece of contour within a cell, from where it leaves the body's side of the boundary to where it returns: the
@@ -86,10 +95,8 @@ pub struct Cell<'a> {
 pub struct Segment<'a> {
     /// The cell's geometry, in whose frame the points are.
     pub geometry: &'a Geometry,
-    from: DVec3,
-    to: DVec3,
-    from_edge: usize,
-    to_edge: usize,
+    from: Crossing,
+    to: Crossing,
     /// Sine of the length.
     sin: f64,
     /// Unit normal, at right angles to the whole segment, out of the body.
@@ -98,40 +105,35 @@ pub struct Segment<'a> {
 
 impl<'a> Segment<'a> {
     #[inline(always)]
-    fn new(
-        geometry: &'a Geometry,
-        (from_edge, from): (usize, DVec3),
-        (to_edge, to): (usize, DVec3),
-        body: Body,
-    ) -> Self {
-        let cross = to.cross(from);
+    fn new(geometry: &'a Geometry, from: Crossing, to: Crossing, body: Body) -> Self {
+        let cross = to.point.at.cross(from.point.minus(&to.point));
         let sin = cross.length();
         let normal = cross * (if body == Body::Above { 1.0 } else { -1.0 } / sin);
-        Segment { geometry, from, to, from_edge, to_edge, sin, normal }
+        Segment { geometry, from, to, sin, normal }
     }
 
     /// Length in radians.
     #[inline(always)]
     pub fn length(&self) -> f64 {
-        angles::from_sin_cos(self.sin, self.from.dot(self.to))
+        angles::from_sin_cos(self.sin, self.from.point.at.dot(self.to.point.at))
     }
 
     /// Direction of the normal at each corner, after transport there from the segment's midpoint: e^{iϕ} with ϕ
     /// counted from south towards east.
     #[inline(always)]
     pub fn directions(&self) -> Phases<4> {
-        let midpoint = self.from + self.to;
+        let midpoint = self.from.point.at + self.to.point.at;
         transport::to_corners(self.normal, midpoint, midpoint.length(), self.geometry)
     }
 
     /// The part of the contour's total curvature that belongs to this segment: the angles, at both ends, between
     /// the contour and the perpendicular of the crossed edge. Two cells share each crossing's exterior angle.
     pub fn turn(&self) -> f64 {
-        let end = |point: DVec3, edge: usize| {
-            let inward = self.geometry.inward(edge);
-            self.normal.dot(inward).atan2(point.cross(self.normal).dot(inward).abs())
+        let end = |crossing: &Crossing| {
+            let inward = self.geometry.inward(crossing.edge);
+            self.normal.dot(inward).atan2(crossing.point.at.cross(self.normal).dot(inward).abs())
         };
-        end(self.from, self.from_edge) + end(self.to, self.to_edge)
+        end(&self.from) + end(&self.to)
     }
 }
 
@@ -145,10 +147,12 @@ pub trait Sink {
     fn inside(&mut self, cell: Cell<'_>, thresholds: Range<usize>, area: f64);
     /// Area in steradian of the body in a cell that the contour crosses at this threshold.
     fn area(&mut self, cell: Cell<'_>, threshold: usize, area: f64);
-    /// A piece of contour. All pieces of a cell come in a row.
-    fn segment(&mut self, cell: Cell<'_>, threshold: usize, segment: &Segment<'_>);
+    /// The contour in a cell at this threshold: one piece, or two at a saddle. All of a cell come in a row.
+    fn contour(&mut self, cell: Cell<'_>, threshold: usize, segments: &[Segment<'_>]);
     /// No more pieces of this cell follow.
-    fn finished(&mut self, cell: Cell<'_>);
+    fn cell_finished(&mut self, cell: Cell<'_>);
+    /// No more cells of this cell ring follow.
+    fn ring_finished(&mut self, ring: usize);
 }
 
 /// Marches through all cells of these cell rings (`0..=4 Nside`), ring by ring and eastwards within a sector.
@@ -166,7 +170,7 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
             }
             for sector in 0..ring.sectors {
                 let pixels = stencil.pixels(sector);
-                let cell = Cell { pixels: &pixels, count: stencil.count() };
+                let cell = Cell { ring: i, pixels: &pixels, count: stencil.count() };
                 let bins = pixels.map(|p| field.bins[p.index]);
                 // A triangle's fourth corner repeats its first.
                 let lo = bins[0].min(bins[1]).min(bins[2].min(bins[3]));
@@ -189,19 +193,18 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
                         Body::Above => 0..lo,
                         Body::Below => hi..field.thresholds.len(),
                     };
-                    if !whole.is_empty() {
-                        sink.inside(cell, whole, *area);
-                    }
+                    sink.inside(cell, whole, *area);
                 }
                 if lo < hi {
                     let values = pixels.map(|p| field.values[p.index]);
                     for t in lo..hi {
                         cut(field, t, geometry, *area, cell, &values, bins.map(|b| usize::from(b) > t), sink);
                     }
-                    sink.finished(cell);
                 }
+                sink.cell_finished(cell);
             }
         }
+        sink.ring_finished(i);
     }
 }
 
@@ -219,12 +222,14 @@ fn cut(
     sink: &mut impl Sink,
 ) {
     let threshold = field.thresholds[t];
-    let next = |c: usize| if c + 1 == cell.count { 0 } else { c + 1 };
+    let next = |corner: usize| geometry.next(corner);
     let crossing = |edge: usize| {
         // Halves, so that differences of the largest numbers stay finite.
-        let (a, b) = (0.5 * values[edge], 0.5 * values[next(edge)]);
-        let fraction = ((0.5 * threshold - a) / (b - a)).clamp(CROSSING_MARGIN, 1.0 - CROSSING_MARGIN);
-        (edge, geometry.point(edge, fraction))
+        let (a, b, t) = (0.5 * values[edge], 0.5 * values[next(edge)], 0.5 * threshold);
+        let from_start = (t - a) / (b - a);
+        let from_end = from_start > 0.5;
+        let fraction = if from_end { (t - b) / (a - b) } else { from_start };
+        Crossing { edge, point: geometry.point(edge, from_end, fraction.max(CROSSING_MARGIN)) }
     };
     let saddle = cell.count == 4 && above[0] == above[2] && above[1] == above[3];
     if !saddle {
@@ -234,36 +239,37 @@ fn cut(
             returning = next(returning);
         }
         let (from, to) = (crossing(leaving), crossing(returning));
-        sink.segment(cell, t, &Segment::new(geometry, from, to, field.body));
+        sink.contour(cell, t, &[Segment::new(geometry, from, to, field.body)]);
         if sink.wants_area() {
             // The part above: a fan of triangles from `to` over its corners to `from`.
             let mut area = 0.0;
             let mut corner = next(returning);
             while corner != leaving {
-                area += area_of_triangle(to.1, geometry.corner[corner], geometry.corner[next(corner)]);
+                area += area_of_triangle(to.point.at, geometry.corner[corner], geometry.corner[next(corner)]);
                 corner = next(corner);
             }
-            area += area_of_triangle(to.1, geometry.corner[leaving], from.1);
+            area += area_of_triangle(to.point.at, geometry.corner[leaving], from.point.at);
             sink.area(cell, t, if field.body == Body::Above { area } else { cell_area - area });
         }
         return;
     }
     // A saddle: the corners above are connected through the middle if the mean is above, else cut off one by one.
-    let connected = values.iter().map(|v| 0.25 * v).sum::<f64>() > threshold;
+    // (Summed crosswise, so that it does not depend on how the cell is turned.)
+    let quarters = values.map(|v| 0.25 * v);
+    let connected = (quarters[0] + quarters[2]) + (quarters[1] + quarters[3]) > threshold;
     let crossings = [crossing(0), crossing(1), crossing(2), crossing(3)];
-    let mut cut_off = 0.0;
-    for corner in 0..4 {
-        if above[corner] == connected {
-            continue;
-        }
-        let (before, after) = (crossings[(corner + 3) % 4], crossings[corner]);
+    let first = usize::from(above[0] == connected);
+    let cut_off = [first, first + 2].map(|corner| (crossings[(corner + 3) % 4], corner, crossings[corner]));
+    let segments = cut_off.map(|(before, _, after)| {
         let (from, to) = if connected { (before, after) } else { (after, before) };
-        sink.segment(cell, t, &Segment::new(geometry, from, to, field.body));
-        if sink.wants_area() {
-            cut_off += area_of_triangle(before.1, geometry.corner[corner], after.1);
-        }
-    }
+        Segment::new(geometry, from, to, field.body)
+    });
+    sink.contour(cell, t, &segments);
     if sink.wants_area() {
+        let area = |(before, corner, after): (Crossing, usize, Crossing)| {
+            area_of_triangle(before.point.at, geometry.corner[corner], after.point.at)
+        };
+        let cut_off = area(cut_off[0]) + area(cut_off[1]);
         sink.area(cell, t, if connected == (field.body == Body::Above) { cell_area - cut_off } else { cut_off });
     }
 }

@@ -37,7 +37,7 @@ pub struct Selection {
 /// Where each selected quantity stands among the rows of a ring.
 #[derive(Clone, Debug)]
 pub struct Layout {
-    /// Cell shares that are masked, in twelfths of a cell. Absent where nothing is masked.
+    /// Cell shares that are masked, of the four that each pixel has. Absent where nothing is masked.
     pub masked: Option<usize>,
     /// W0.
     pub area: Option<usize>,
@@ -78,6 +78,9 @@ impl Layout {
     }
 }
 
+/// Cell shares of a pixel: it is a corner of four cells.
+pub const SHARES: usize = 4;
+
 /// Moments at the pixels of one ring, a row for each quantity.
 #[derive(Clone, Debug)]
 pub struct RingMoments {
@@ -86,6 +89,14 @@ pub struct RingMoments {
 }
 
 impl RingMoments {
+    /// The moments of these pixels and those, one after the other.
+    pub fn joined(&self, these: Range<usize>, those: Range<usize>) -> Self {
+        let len = these.len() + those.len();
+        let rows = self.data.chunks_exact(self.len);
+        let data = rows.flat_map(|row| row[these.clone()].iter().chain(&row[those.clone()])).copied().collect();
+        RingMoments { data, len }
+    }
+
     /// One quantity at all pixels of the ring.
     #[inline]
     pub fn row(&self, row: usize) -> &[f64] {
@@ -99,7 +110,13 @@ pub fn at_pixels(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Vec
         let len = field.grid().ring(i).len;
         RingMoments { data: vec![0.0; layout.rows * len], len }
     });
-    let mut gather = Gather { layout, first: rings.start, rings: moments.collect(), cell: vec![[0.0; 4]; layout.rows] };
+    let mut gather = Gather {
+        layout,
+        first: rings.start,
+        rings: moments.collect(),
+        same_ring: Vec::new(),
+        cell: vec![[0.0; 4]; layout.rows],
+    };
     // A pixel's cells lie on its own ring and the two beside it.
     march_into(field, rings.start - 1..rings.end + 1, &mut gather);
     gather.rings
@@ -114,47 +131,39 @@ struct Gather<'a> {
     layout: &'a Layout,
     first: usize,
     rings: Vec<RingMoments>,
+    /// What the present cell ring's cells give to the pixels of the same ring, apart from the rest: two cells to each,
+    /// in an order that differs where the ring begins. So the sum does not depend on where that is.
+    same_ring: Vec<f64>,
     /// The present cell's moments as seen from each of its corners, row by row.
     cell: Vec<[f64; 4]>,
 }
 
 impl Gather<'_> {
+    /// The moments of a ring, if it is one of those asked for.
+    #[inline(always)]
+    fn ring(&mut self, ring: usize) -> Option<&mut RingMoments> {
+        ring.checked_sub(self.first).and_then(|i| self.rings.get_mut(i))
+    }
+
     /// Adds one share for each corner to a row.
     #[inline(always)]
     fn share(&mut self, cell: Cell<'_>, row: usize, share: impl Fn(usize) -> f64) {
         for (c, pixel) in cell.pixels[..cell.count].iter().enumerate() {
-            if let Some(ring) = pixel.ring.checked_sub(self.first).and_then(|i| self.rings.get_mut(i)) {
-                ring.data[row * ring.len + pixel.column] += share(c);
+            if let Some(ring) = self.ring(pixel.ring) {
+                let at = row * ring.len + pixel.column;
+                if pixel.ring == cell.ring {
+                    let len = ring.data.len();
+                    self.same_ring.resize(len, 0.0);
+                    self.same_ring[at] += share(c);
+                } else {
+                    ring.data[at] += share(c);
+                }
             }
-        }
-    }
-}
-
-impl Sink for Gather<'_> {
-    fn wants_area(&self) -> bool {
-        self.layout.area.is_some()
-    }
-
-    fn masked(&mut self, cell: Cell<'_>, _: f64) {
-        if let Some(row) = self.layout.masked {
-            self.share(cell, row, |_| (12 / cell.count) as f64);
-        }
-    }
-
-    fn inside(&mut self, cell: Cell<'_>, thresholds: Range<usize>, area: f64) {
-        if let Some(row) = self.layout.area {
-            self.share(cell, row, |_| area * thresholds.len() as f64 / cell.count as f64);
-        }
-    }
-
-    fn area(&mut self, _: Cell<'_>, _: usize, area: f64) {
-        if let Some(row) = self.layout.area {
-            self.cell[row].iter_mut().for_each(|a| *a += area);
         }
     }
 
     #[inline(always)]
-    fn segment(&mut self, _: Cell<'_>, _: usize, segment: &Segment<'_>) {
+    fn add(&mut self, segment: &Segment<'_>) {
         let layout = self.layout;
         let by_length = layout.weight == Weight::Length && !layout.ranks.is_empty();
         let by_turn = layout.weight == Weight::Curvature && !layout.ranks.is_empty();
@@ -179,13 +188,56 @@ impl Sink for Gather<'_> {
             }
         }
     }
+}
+
+impl Sink for Gather<'_> {
+    fn wants_area(&self) -> bool {
+        self.layout.area.is_some()
+    }
+
+    fn masked(&mut self, cell: Cell<'_>, _: f64) {
+        if let Some(row) = self.layout.masked {
+            self.share(cell, row, |_| 1.0);
+        }
+    }
+
+    fn inside(&mut self, cell: Cell<'_>, thresholds: Range<usize>, area: f64) {
+        self.area(cell, thresholds.start, area * thresholds.len() as f64);
+    }
+
+    fn area(&mut self, _: Cell<'_>, _: usize, area: f64) {
+        if let Some(row) = self.layout.area {
+            self.cell[row].iter_mut().for_each(|a| *a += area);
+        }
+    }
 
     #[inline(always)]
-    fn finished(&mut self, cell: Cell<'_>) {
+    fn contour(&mut self, _: Cell<'_>, _: usize, segments: &[Segment<'_>]) {
+        let [one, other] = segments else { return segments.iter().for_each(|s| self.add(s)) };
+        // The two of a saddle are summed first: their order depends on how the cell is turned.
+        let so_far = std::mem::replace(&mut self.cell, vec![[0.0; 4]; self.layout.rows]);
+        self.add(one);
+        self.add(other);
+        for (row, so_far) in self.cell.iter_mut().zip(so_far) {
+            row.iter_mut().zip(so_far).for_each(|(a, b)| *a += b);
+        }
+    }
+
+    #[inline(always)]
+    fn cell_finished(&mut self, cell: Cell<'_>) {
         let part = 1.0 / cell.count as f64;
         for row in 0..self.cell.len() {
             let shares = std::mem::take(&mut self.cell[row]);
             self.share(cell, row, |c| shares[c] * part);
         }
+    }
+
+    fn ring_finished(&mut self, ring: usize) {
+        let same_ring = std::mem::take(&mut self.same_ring);
+        if let Some(ring) = self.ring(ring) {
+            ring.data.iter_mut().zip(&same_ring).for_each(|(a, b)| *a += b);
+        }
+        self.same_ring = same_ring;
+        self.same_ring.clear();
     }
 }

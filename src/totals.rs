@@ -71,10 +71,12 @@ impl Sink for RingTotals {
         self.by_threshold[threshold].area += area;
     }
 
-    fn segment(&mut self, _: Cell<'_>, threshold: usize, segment: &Segment<'_>) {
-        self.by_threshold[threshold].length += segment.length();
-        self.by_threshold[threshold].curvature += segment.turn();
+    fn contour(&mut self, _: Cell<'_>, threshold: usize, segments: &[Segment<'_>]) {
+        self.by_threshold[threshold].length += segments.iter().map(Segment::length).sum::<f64>();
+        self.by_threshold[threshold].curvature += segments.iter().map(Segment::turn).sum::<f64>();
     }
 
-    fn finished(&mut self, _: Cell<'_>) {}
+    fn cell_finished(&mut self, _: Cell<'_>) {}
+
+    fn ring_finished(&mut self, _: usize) {}
 }

@@ -11,9 +11,8 @@ use longan_formats::Healpix;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::cells;
 use crate::contour::Field;
-use crate::moments::{self, Layout, RingMoments, Selection};
+use crate::moments::{self, Layout, RingMoments, SHARES, Selection};
 use crate::transport::{Phases, Powers, RingTransport};
 
 /// Rings of input moments that are made at a time, at least.
@@ -147,7 +146,8 @@ impl Band {
 struct OutputRing {
     output: Healpix,
     ring: usize,
-    input: Healpix,
+    /// Whether a window is its own pixel only; then no ring is reached.
+    single: bool,
     reached: Vec<Reached>,
 }
 
@@ -189,7 +189,8 @@ impl OutputRing {
                 stride: Complex64::cis(BLOCK as f64 * step),
             })
         });
-        OutputRing { output, ring, input, reached: if radius == 0.0 { Vec::new() } else { reached.collect() } }
+        let single = radius == 0.0;
+        OutputRing { output, ring, single, reached: if single { Vec::new() } else { reached.collect() } }
     }
 
     /// Windows about the pixels of one quadrant of the ring. Longitudes are counted from the quadrant's own meridian,
@@ -210,25 +211,31 @@ impl OutputRing {
         let mut moments = Moments::default();
         for (k, out) in out.chunks_exact_mut(columns).enumerate() {
             sums.fill(0.0);
-            let mut shares = 0;
+            let mut pixels = 0;
             let phi = ring.phi(k as isize);
             let column = quadrant * in_quadrant + k;
-            if self.reached.is_empty() {
-                shares += self.shares(self.ring, column..column + 1);
+            if self.single {
+                pixels += 1;
                 for (row, sum) in sums.iter_mut().enumerate() {
                     *sum = band.ring(self.ring).row(row)[column];
                 }
             }
             for reached in &self.reached {
-                for (columns, dphi) in reached.columns(phi, quadrant) {
-                    shares += self.shares(reached.ring, columns.clone());
-                    add(band.ring(reached.ring), layout, columns, dphi, reached, &mut sums);
+                let moments = band.ring(reached.ring);
+                let (columns, dphi) = reached.columns(phi, quadrant);
+                pixels += columns.len();
+                if columns.end <= reached.len {
+                    add(moments, layout, columns, dphi, reached, &mut sums);
+                } else {
+                    // Across φ = 0: put together first, so that the sum is the same wherever the window lies.
+                    let joined = moments.joined(columns.start..reached.len, 0..columns.end - reached.len);
+                    add(&joined, layout, 0..columns.len(), dphi, reached, &mut sums);
                 }
             }
             moments.centre = (ring.theta(), ring.phi(column as isize));
-            moments.masked_fraction = match (shares, layout.masked) {
+            moments.masked_fraction = match (pixels, layout.masked) {
                 (0, _) => 1.0,
-                (_, Some(row)) => sums[row] / shares as f64,
+                (_, Some(row)) => sums[row] / (SHARES * pixels) as f64,
                 (_, None) => 0.0,
             };
             sums.iter_mut().for_each(|sum| *sum /= thresholds as f64);
@@ -242,17 +249,12 @@ impl OutputRing {
         }
         out
     }
-
-    /// Cell shares of these pixels, in twelfths of a cell.
-    fn shares(&self, ring: usize, columns: Range<usize>) -> usize {
-        12 * columns.len() + cells::triangles(self.input, ring, columns)
-    }
 }
 
 impl Reached {
-    /// The pixels within the window about longitude `phi` (of the first quadrant), moved on by `quadrant`s: at most two
-    /// ranges of columns, each with its first pixel's Δφ.
-    fn columns(&self, phi: f64, quadrant: usize) -> impl Iterator<Item = (Range<usize>, f64)> + use<> {
+    /// The pixels within the window about longitude `phi` (of the first quadrant), moved on by `quadrant`s: columns,
+    /// which may run beyond the ring's end into its beginning, and the first one's Δφ.
+    fn columns(&self, phi: f64, quadrant: usize) -> (Range<usize>, f64) {
         let (len, step) = (self.len as isize, TAU / self.len as f64);
         let first_phi = self.shift as f64 * step / 2.0;
         let (mut from, mut to) = (0, len);
@@ -261,15 +263,9 @@ impl Reached {
             to = ((phi + self.half_width - first_phi) / step).floor() as isize + 1;
             to = to.clamp(from, from + len);
         }
-        let at = (from + quadrant as isize * len / 4).rem_euclid(len);
-        let before_end = (to - from).min(len - at);
-        let dphi = |j: isize| (2 * j + self.shift as isize) as f64 * (step / 2.0) - phi;
-        [
-            (at as usize..(at + before_end) as usize, dphi(from)),
-            (0..(to - from - before_end) as usize, dphi(from + before_end)),
-        ]
-        .into_iter()
-        .filter(|(columns, _)| !columns.is_empty())
+        let at = (from + quadrant as isize * len / 4).rem_euclid(len) as usize;
+        let dphi = (2 * from + self.shift as isize) as f64 * (step / 2.0) - phi;
+        (at..at + (to - from) as usize, dphi)
     }
 }
 

@@ -125,13 +125,16 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     assert_eq!(masked > 0.0, mask.is_some());
 
     if table.columns.contains_key("litchi_evq") {
-        check_litchi(&table, &run);
+        let analysis = Analysis { max_masked: 1.0 / 16.0, ..analysis.clone() };
+        check_litchi(&table, |name| {
+            analysis.minkowski_maps(&map, &[find(name).unwrap()], |_| ()).unwrap().values.remove(0)
+        });
     }
 }
 
 /// litchi by quantiles of the relative difference: it differs at the boundaries of the polar caps, where it counts cells
 /// twice, and elsewhere by its finite differences.
-fn check_litchi(table: &Table, run: &dyn Fn(&[&str]) -> Vec<Vec<f64>>) {
+fn check_litchi(table: &Table, run: impl Fn(&str) -> Vec<f64>) {
     let pairs = [
         ("evq", "litchi_evq"),
         ("psi2", "litchi_psi2_abs"),
@@ -143,22 +146,22 @@ fn check_litchi(table: &Table, run: &dyn Fn(&[&str]) -> Vec<Vec<f64>>) {
         ("w2", "litchi_w2"),
     ];
     let grid = longan::Healpix::with_pixels(table.columns["w0"].len()).unwrap();
-    // Windows of 6° that keep clear of the caps' boundaries: in the belt, and in the caps away from the meridians.
-    let clear: Vec<usize> = (0..grid.pixels())
-        .filter(|&p| {
-            let (theta, _) = grid.centre(p);
-            (theta.cos().abs().acos().to_degrees() - 48.19) > 7.0
-        })
-        .collect();
-    assert!(clear.len() > 1000);
-    for (name, litchi) in pairs {
-        let (ours, theirs) = (&run(&[name])[0], &table.columns[litchi]);
-        let scale = theirs.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-        let mut errors: Vec<f64> = clear.iter().map(|&p| (ours[p] - theirs[p]).abs() / scale).collect();
+    // Windows of 6° that keep clear of the caps: litchi miscounts cells along the base pixels' boundaries there.
+    let cap = f64::acos(2.0 / 3.0).to_degrees();
+    let clear = |p: &usize| grid.centre(*p).0.cos().abs().acos().to_degrees() > cap + 7.0;
+    for (name, litchi) in pairs.into_iter().filter(|(_, litchi)| table.columns.contains_key(*litchi)) {
+        let (ours, theirs) = (run(name), &table.columns[litchi]);
+        let largest = theirs.iter().filter(|x| x.is_finite()).fold(0.0, |a: f64, x| a.max(x.abs()));
+        let mut errors = Vec::new();
+        for p in (0..grid.pixels()).filter(clear) {
+            assert_eq!(ours[p].is_nan(), theirs[p].is_nan(), "{name}, pixel {p}: {} and {}", ours[p], theirs[p]);
+            errors.extend(theirs[p].is_finite().then(|| (ours[p] - theirs[p]).abs() / largest));
+        }
+        assert!(errors.len() > 500);
         errors.sort_by(f64::total_cmp);
         let quantile = |q: f64| errors[((errors.len() - 1) as f64 * q) as usize];
         println!("{name}: median {:.1e}, 99 % {:.1e}, largest {:.1e}", quantile(0.5), quantile(0.99), quantile(1.0));
-        assert!(quantile(0.5) < 2e-7 && quantile(1.0) < 1e-3, "{name}");
+        assert!(quantile(0.5) < 5e-5 && quantile(0.99) < 2e-3 && quantile(1.0) < 5e-3, "{name}");
     }
 }
 

@@ -37,32 +37,40 @@ fn binary_rectangles_have_the_paper_s_quotients() {
 }
 
 #[test]
-fn smooth_rectangles_have_the_moments_of_their_sides() {
-    let grid = Healpix::new(512).unwrap();
+fn smooth_rectangles_converge_to_the_moments_of_their_sides() {
+    let names = ["psi2", "psi4", "w1"];
     for (shape, a, b) in [(Shape::Square, 4.0, 4.0), (Shape::Rectangle2, 6.0, 3.0), (Shape::Rectangle3, 6.0, 2.0)] {
-        let map = shapes(grid, &[solid(shape, 20.0, 30.0, a)], Edge::Smooth);
-        let got = there(&map, &Analysis { window: 8.0, ..at(0.0) }, &["psi2", "psi4", "w1"], (20.0, 30.0));
+        let [coarse, fine] = [256, 512].map(|nside| {
+            let map = shapes(Healpix::new(nside).unwrap(), &[solid(shape, 20.0, 30.0, a)], Edge::Smooth);
+            there(&map, &Analysis { window: 8.0, ..at(0.0) }, &names, (20.0, 30.0))
+        });
         let (a, b) = (f64::to_radians(a), f64::to_radians(b));
-        // Corners are cut by a pixel, and sides are great circles.
-        assert!((got[0] - 2.0 * (a - b)).abs() < 0.01 * (a + b), "{shape}: {got:?}");
-        assert!((got[1] / (2.0 * (a + b)) - 1.0).abs() < 0.03, "{shape}: {got:?}");
-        assert!((got[2] / (2.0 * (a + b)) - 1.0).abs() < 0.02, "{shape}: {got:?}");
+        let limits = [2.0 * (a - b), 2.0 * (a + b), 2.0 * (a + b)];
+        for i in 0..3 {
+            // Contours cut the corners by about a pixel, so the error shrinks with the pixels.
+            let [coarse, fine] = [coarse[i], fine[i]].map(|got| (got - limits[i]).abs());
+            let what = format!("{shape}, {}: off by {coarse}, then {fine}", names[i]);
+            assert!(fine < 0.65 * coarse + 2e-4 && fine < [4e-4, 0.012, 0.004][i], "{what}");
+        }
     }
 }
 
 #[test]
 fn a_smooth_cap_is_round() {
-    for (nside, lon, lat) in [(256, 10.0, 0.0), (256, 70.0, 41.8), (256, 200.0, 90.0), (200, 45.0, -60.0)] {
-        let map = shapes(Healpix::new(nside).unwrap(), &[solid(Shape::Cap, lon, lat, 6.0)], Edge::Smooth);
-        let names = ["w0", "w1", "w2", "psi1", "psi2", "psi3", "psi4", "psi5", "psi6"];
+    let r = 3f64.to_radians();
+    let output = Healpix::new(16).unwrap();
+    // Centres of output pixels in belt and caps, on base pixels' boundaries and beside the pole.
+    for (theta, phi) in [0, 100, 480, 1500, 2303, 3000].map(|p| output.centre(p)) {
+        let (lon, lat) = (phi.to_degrees(), 90.0 - theta.to_degrees());
+        let map = shapes(Healpix::new(512).unwrap(), &[solid(Shape::Cap, lon, lat, 6.0)], Edge::Smooth);
+        let names = ["w0", "w1", "w2", "psi1", "psi2", "psi3", "psi4"];
         let got = there(&map, &Analysis { window: 10.0, ..at(0.0) }, &names, (lon, lat));
-        let r = 3f64.to_radians();
-        assert!((got[0] / (TAU * (1.0 - r.cos())) - 1.0).abs() < 3e-4, "area {got:?}");
-        assert!((got[1] / (TAU * r.sin()) - 1.0).abs() < 3e-4, "length {got:?}");
+        assert!((got[0] / (TAU * (1.0 - r.cos())) - 1.0).abs() < 5e-4, "area {got:?}");
+        assert!((got[1] / (TAU * r.sin()) - 1.0).abs() < 2e-4, "length {got:?}");
         // The window holds all of the contour, so Gauss–Bonnet holds within it.
         assert!((got[0] + got[2] - TAU).abs() < 1e-9, "curvature {got:?}");
         for psi in &got[3..] {
-            assert!(psi / got[1] < 2e-3, "{got:?}");
+            assert!(psi / got[1] < 3e-4, "{got:?}");
         }
     }
 }
