@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::read::{CHUNK, Canvas, read_integers, read_values};
 use super::table::{Column, Table};
-use crate::cfitsio::Fits;
+use crate::cfitsio::FitsReader;
 use crate::{Error, Healpix, Ordering};
 
 /// The finest order of HEALPix, and so of UNIQ numbers.
@@ -56,16 +56,16 @@ fn place(uniq: i128) -> Option<u64> {
 
 /// Calls `each` with the place of every cell in chunks, in the table's order, and the number of the first of them.
 fn for_places(
-    fits: &mut Fits,
+    fits: &mut FitsReader,
     table: &Table,
     index: &Column,
-    mut each: impl FnMut(&mut Fits, usize, &[u64]) -> Result<(), Error>,
+    mut each: impl FnMut(&mut FitsReader, usize, &[u64]) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let total = table.rows * index.repeat;
     let (mut uniqs, mut places) = (Vec::new(), Vec::new());
     for start in (0..total).step_by(CHUNK) {
         uniqs.resize(CHUNK.min(total - start), 0);
-        read_integers(fits, index, start, &mut uniqs)?;
+        read_integers(fits, table, index, start, &mut uniqs)?;
         places.clear();
         for (i, &uniq) in (start..).zip(&uniqs) {
             let row = i / index.repeat + 1;
@@ -77,7 +77,7 @@ fn for_places(
 }
 
 /// Nside of the finest cells.
-pub(super) fn finest(fits: &mut Fits, table: &Table, index: &Column) -> Result<usize, Error> {
+pub(super) fn finest(fits: &mut FitsReader, table: &Table, index: &Column) -> Result<usize, Error> {
     let mut order = 0;
     for_places(fits, table, index, |_, _, places| {
         let finest = places.iter().map(|&place| Cell { place, value: 0.0 }.order()).max();
@@ -92,7 +92,7 @@ pub(super) fn finest(fits: &mut Fits, table: &Table, index: &Column) -> Result<u
 /// A pixel gets the mean over the cells in it, weighted by their area and without those that are masked; a pixel
 /// within a cell gets the cell's value.
 pub(super) fn read(
-    fits: &mut Fits,
+    fits: &mut FitsReader,
     table: &Table,
     column: &Column,
     index: &Column,

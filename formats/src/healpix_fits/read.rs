@@ -5,15 +5,15 @@
 use rayon::prelude::*;
 
 use super::multi_order;
-use super::table::{Column, Kind, Layout, Table};
-use crate::cfitsio::Fits;
+use super::table::{self, Column, Kind, Layout, Table};
+use crate::cfitsio::FitsReader;
 use crate::{Error, Healpix, Map, Ordering, Selection, UNSEEN, is_bad};
 
 /// Values per call to cfitsio: many enough that calls cost nothing, few enough to stay in the cache.
 pub(super) const CHUNK: usize = 1 << 17;
 
 /// Reads one field of a table.
-pub(super) fn read(fits: &mut Fits, table: &Table, selection: &Selection) -> Result<Map, Error> {
+pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) -> Result<Map, Error> {
     let column = table.column(selection.field.as_ref())?;
     if let (Some(nside), Layout::Implicit { .. } | Layout::Explicit { .. }) = (selection.nside, &table.layout) {
         return Err(Error::NotMultiOrder { hdu: table.hdu, nside });
@@ -84,7 +84,12 @@ impl Canvas {
     }
 }
 
-fn implicit(fits: &mut Fits, table: &Table, column: &Column, named: Option<(usize, usize)>) -> Result<Canvas, Error> {
+fn implicit(
+    fits: &mut FitsReader,
+    table: &Table,
+    column: &Column,
+    named: Option<(usize, usize)>,
+) -> Result<Canvas, Error> {
     let (grid, pixels) = table.implicit(column, named)?;
     let chunks = (0..pixels.len()).step_by(CHUNK).map(|start| (start, CHUNK.min(pixels.len() - start)));
     match table.ordering {
@@ -112,7 +117,13 @@ fn implicit(fits: &mut Fits, table: &Table, column: &Column, named: Option<(usiz
     }
 }
 
-fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, grain: usize) -> Result<Canvas, Error> {
+fn explicit(
+    fits: &mut FitsReader,
+    table: &Table,
+    column: &Column,
+    index: &Column,
+    grain: usize,
+) -> Result<Canvas, Error> {
     let grid = table.explicit_grid(index)?;
     let run = table.run(column, index, grain)?;
     let total = table.rows * index.repeat;
@@ -124,7 +135,7 @@ fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, gra
         let count = indices_per_chunk.min(total - start);
         indices.resize(count, 0);
         values.resize(count * run, 0.0);
-        read_integers(fits, index, start, &mut indices)?;
+        read_integers(fits, table, index, start, &mut indices)?;
         read_values(fits, table, column, start * run, &mut values)?;
         canvas.places.clear();
         for &first in &indices {
@@ -152,7 +163,7 @@ fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, gra
 
 /// Reads values of a column from its `start`-th on (counted over all rows); all that mean "no value" become NaN.
 pub(super) fn read_values(
-    fits: &mut Fits,
+    fits: &mut FitsReader,
     table: &Table,
     column: &Column,
     start: usize,
@@ -198,10 +209,25 @@ fn mask(values: &mut [f64], bad_data: Option<f64>) {
 }
 
 /// Reads integers of a column from its `start`-th on (counted over all rows), unsigned ones included.
-pub(super) fn read_integers(fits: &mut Fits, column: &Column, start: usize, out: &mut [i128]) -> Result<(), Error> {
+pub(super) fn read_integers(
+    fits: &mut FitsReader,
+    table: &Table,
+    column: &Column,
+    start: usize,
+    out: &mut [i128],
+) -> Result<(), Error> {
     // cfitsio applies TZERO in 64 bits or in floating point, neither of which holds every unsigned number.
-    let mut scaling = |key: &str| super::table::number(fits, &format!("{key}{}", column.number));
-    let (scale, zero) = (scaling("TSCAL")?.unwrap_or(1.0) as i128, scaling("TZERO")?.unwrap_or(0.0) as i128);
+    let mut scaling = |key: &str, default: i128| {
+        let key = format!("{key}{}", column.number);
+        match table::number(fits, &key)? {
+            None => Ok(default),
+            Some(value) if value.fract() == 0.0 && value.abs() <= 2f64.powi(63) => Ok(value as i128),
+            Some(value) => {
+                Err(table::bad_key(table.hdu, &key, value, "a whole number of 64 bits, as pixel numbers need"))
+            }
+        }
+    };
+    let (scale, zero) = (scaling("TSCAL", 1)?, scaling("TZERO", 0)?);
     fits.set_scaling(column.number, 1.0, 0.0)?;
     let mut raw = vec![0; out.len()];
     fits.read_i64(column.number, (start / column.repeat, start % column.repeat), &mut raw)?;
