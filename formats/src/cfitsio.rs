@@ -96,6 +96,14 @@ fn call(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), E
     Err(Error::Cfitsio { action: action.to_string(), status, message: from_c(&text) })
 }
 
+/// Calls cfitsio to write.
+fn write(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
+    call(action, function).map_err(|e| match e {
+        Error::Cfitsio { action, status, message } => Error::CfitsioWrite { action, status, message },
+        e => e,
+    })
+}
+
 /// The text in a buffer up to its NUL, without FITS's padding and control characters. Headers should be ASCII, but
 /// units such as µK are met in UTF-8 and Latin-1.
 fn from_c(buffer: &[c_char]) -> String {
@@ -356,7 +364,7 @@ impl FitsWriter {
         let name = c_path(path)?;
         let mut handle = ptr::null_mut();
         // SAFETY: `name` is a C string and `handle` a place for the result, both valid during the call.
-        call("create it", |status| unsafe {
+        write("create it", |status| unsafe {
             sys::ffdkinit(&mut handle, name.as_ptr(), status);
         })?;
         Ok(FitsWriter { handle: Handle(handle) })
@@ -366,7 +374,7 @@ impl FitsWriter {
     pub(crate) fn close(mut self) -> Result<(), Error> {
         let handle = std::mem::replace(&mut self.handle.0, ptr::null_mut());
         // SAFETY: `handle` is open, and no longer in `self`, so it is closed once.
-        call("finish it", |status| unsafe {
+        write("finish it", |status| unsafe {
             sys::ffclos(handle, status);
         })
     }
@@ -375,7 +383,7 @@ impl FitsWriter {
     pub(crate) fn write_primary(&mut self) -> Result<(), Error> {
         let mut axes: [c_long; 1] = [0];
         // SAFETY: the handle is open for writing; no axis is read where their number is 0.
-        call("write the primary header", |status| unsafe {
+        write("write the primary header", |status| unsafe {
             sys::ffcrim(self.handle.0, 8, 0, axes.as_mut_ptr(), status);
         })
     }
@@ -388,7 +396,7 @@ impl FitsWriter {
         let name = c_text(name);
         // SAFETY: the handle is open for writing; each array has as many C strings as there are columns, which
         // cfitsio reads during the call only.
-        call("write the header of a table", |status| unsafe {
+        write("write the header of a table", |status| unsafe {
             sys::ffcrtb(
                 self.handle.0,
                 2,
@@ -409,7 +417,7 @@ impl FitsWriter {
         let mut value = c_text(value).into_bytes_with_nul();
         let mut card = [0 as c_char; sys::FLEN_CARD as usize];
         // SAFETY: the handle is open for writing; all texts are C strings and `card` has the documented length.
-        call("write a header entry", |status| unsafe {
+        write("write a header entry", |status| unsafe {
             sys::ffmkky(key.as_ptr(), value.as_mut_ptr().cast(), comment.as_ptr(), card.as_mut_ptr(), status);
             sys::ffprec(self.handle.0, card.as_ptr(), status);
         })
@@ -419,7 +427,7 @@ impl FitsWriter {
     pub(crate) fn write_text(&mut self, key: &str, value: &str, comment: &str) -> Result<(), Error> {
         let (key, value, comment) = (c_text(key), c_text(value), c_text(comment));
         // SAFETY: the handle is open for writing; all texts are C strings.
-        call("write a header entry", |status| unsafe {
+        write("write a header entry", |status| unsafe {
             sys::ffpkls(self.handle.0, key.as_ptr(), value.as_ptr(), comment.as_ptr(), status);
         })
     }
@@ -427,7 +435,7 @@ impl FitsWriter {
     /// Appends the entry that announces texts over several lines.
     pub(crate) fn write_long_text_notice(&mut self) -> Result<(), Error> {
         // SAFETY: the handle is open for writing.
-        call("write a header entry", |status| unsafe {
+        write("write a header entry", |status| unsafe {
             sys::ffplsw(self.handle.0, status);
         })
     }
@@ -436,12 +444,13 @@ impl FitsWriter {
     pub(crate) fn write_history(&mut self, text: &str) -> Result<(), Error> {
         let text = c_text(text);
         // SAFETY: the handle is open for writing; the text is a C string.
-        call("write a header entry", |status| unsafe {
+        write("write a header entry", |status| unsafe {
             sys::ffphis(self.handle.0, text.as_ptr(), status);
         })
     }
 
-    /// Writes numbers to a column, counted from 1, from element `first` of the column (counted from 0) on.
+    /// Writes numbers to a column, counted from 1, from row `row` and element `element` in it
+    /// on (counted from 0).
     pub(crate) fn write_f64(
         &mut self,
         column: c_int,
@@ -449,7 +458,7 @@ impl FitsWriter {
         values: &mut [f64],
     ) -> Result<(), Error> {
         // SAFETY: the handle is open for writing; cfitsio reads `values.len()` elements.
-        call(format_args!("write column {column}"), |status| unsafe {
+        write(format_args!("write column {column}"), |status| unsafe {
             sys::ffpcld(
                 self.handle.0,
                 column,
@@ -470,7 +479,7 @@ impl FitsWriter {
         values: &mut [f32],
     ) -> Result<(), Error> {
         // SAFETY: the handle is open for writing; cfitsio reads `values.len()` elements.
-        call(format_args!("write column {column}"), |status| unsafe {
+        write(format_args!("write column {column}"), |status| unsafe {
             sys::ffpcle(
                 self.handle.0,
                 column,

@@ -90,6 +90,18 @@ pub enum Error {
         /// cfitsio's words for it.
         message: String,
     },
+    /// The FITS library could not write.
+    #[error(
+        "cannot {action}: the FITS library says \"{message}\" (status {status}); check the space and the permissions there"
+    )]
+    CfitsioWrite {
+        /// What was attempted.
+        action: String,
+        /// cfitsio's status.
+        status: i32,
+        /// cfitsio's words for it.
+        message: String,
+    },
     /// A file that ends within a header.
     #[error("cannot {action}: the file ends before it; fetch it again")]
     CutShort {

@@ -131,19 +131,19 @@ pub(super) fn read(
     };
     let depth = u32::from(grid.depth()?);
     let mut canvas = Canvas::new(grid, Ordering::Nested)?;
-    let mut run = Run { first: 0, values: Vec::with_capacity(CHUNK) };
+    let mut batch = Batch { canvas: &mut canvas, places: Vec::with_capacity(CHUNK), values: Vec::with_capacity(CHUNK) };
     let mut mean = Mean { pixel: 0, first: 0.0, sum: 0.0, weight: 0.0 };
     for cell in &cells {
         if cell.order() <= depth {
             let children = 2 * (depth - cell.order());
             for pixel in cell.pixel() << children..(cell.pixel() + 1) << children {
-                run.push(&mut canvas, pixel, cell.value)?;
+                batch.push(pixel, cell.value)?;
             }
         } else {
             let parents = 2 * (cell.order() - depth);
             let pixel = cell.pixel() >> parents;
             if mean.pixel != pixel {
-                mean.flush(&mut run, &mut canvas)?;
+                mean.flush(&mut batch)?;
                 mean.pixel = pixel;
             }
             if !cell.value.is_nan() {
@@ -151,8 +151,8 @@ pub(super) fn read(
             }
         }
     }
-    mean.flush(&mut run, &mut canvas)?;
-    run.flush(&mut canvas)?;
+    mean.flush(&mut batch)?;
+    batch.flush()?;
     Ok(canvas)
 }
 
@@ -174,33 +174,35 @@ impl Mean {
         self.weight += weight;
     }
 
-    fn flush(&mut self, run: &mut Run, canvas: &mut Canvas) -> Result<(), Error> {
+    fn flush(&mut self, batch: &mut Batch<'_>) -> Result<(), Error> {
         if self.weight > 0.0 {
-            run.push(canvas, self.pixel, self.first + self.sum / self.weight)?;
+            batch.push(self.pixel, self.first + self.sum / self.weight)?;
             (self.sum, self.weight) = (0.0, 0.0);
         }
         Ok(())
     }
 }
 
-/// Consecutive pixels that are put onto the canvas together.
-struct Run {
-    first: u64,
+/// Pixels that are put onto the canvas together.
+struct Batch<'a> {
+    canvas: &'a mut Canvas,
+    places: Vec<u64>,
     values: Vec<f64>,
 }
 
-impl Run {
-    fn push(&mut self, canvas: &mut Canvas, pixel: u64, value: f64) -> Result<(), Error> {
-        if pixel != self.first + self.values.len() as u64 || self.values.len() == CHUNK {
-            self.flush(canvas)?;
-            self.first = pixel;
+impl Batch<'_> {
+    fn push(&mut self, pixel: u64, value: f64) -> Result<(), Error> {
+        if self.places.len() == CHUNK {
+            self.flush()?;
         }
+        self.places.push(pixel);
         self.values.push(value);
         Ok(())
     }
 
-    fn flush(&mut self, canvas: &mut Canvas) -> Result<(), Error> {
-        canvas.put_run(self.first as usize, &self.values)?;
+    fn flush(&mut self) -> Result<(), Error> {
+        self.canvas.put(&mut self.places, &self.values)?;
+        self.places.clear();
         self.values.clear();
         Ok(())
     }

@@ -36,8 +36,6 @@ pub(super) struct Canvas {
     grid: Healpix,
     ordering: Ordering,
     values: Vec<f64>,
-    /// Where the values of one chunk go.
-    places: Vec<u64>,
 }
 
 impl Canvas {
@@ -55,29 +53,16 @@ impl Canvas {
             nside: grid.nside(),
             gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
         })?;
-        Ok(Canvas { grid, ordering, values, places: Vec::new() })
+        Ok(Canvas { grid, ordering, values })
     }
 
-    /// Sets consecutive pixels from `first` on.
-    pub(super) fn put_run(&mut self, first: usize, run: &[f64]) -> Result<(), Error> {
-        match self.ordering {
-            Ordering::Ring => self.values[first..first + run.len()].copy_from_slice(run),
-            Ordering::Nested => {
-                self.places.clear();
-                self.places.extend(first as u64..(first + run.len()) as u64);
-                self.scatter(run)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Sets the pixels that `places` holds.
-    fn scatter(&mut self, values: &[f64]) -> Result<(), Error> {
+    /// Sets some pixels, named by `places` in the file's ordering, which this overwrites.
+    pub(super) fn put(&mut self, places: &mut [u64], values: &[f64]) -> Result<(), Error> {
         if self.ordering == Ordering::Nested {
             let layer = cdshealpix::nested::get(self.grid.depth()?);
-            self.places.par_iter_mut().for_each(|p| *p = layer.to_ring(*p));
+            places.par_iter_mut().for_each(|p| *p = layer.to_ring(*p));
         }
-        for (&place, &value) in self.places.iter().zip(values) {
+        for (&place, &value) in places.iter().zip(values) {
             self.values[place as usize] = value;
         }
         Ok(())
@@ -107,10 +92,14 @@ fn implicit(
         }
         Ordering::Nested => {
             let mut canvas = Canvas::new(grid, table.ordering)?;
-            let mut buffer = vec![0.0; CHUNK.min(pixels.len())];
+            let (mut values, mut places) = (Vec::new(), Vec::new());
             for (start, count) in chunks {
-                read_values(fits, table, column, start, &mut buffer[..count])?;
-                canvas.put_run(pixels.start + start, &buffer[..count])?;
+                values.resize(count, 0.0);
+                read_values(fits, table, column, start, &mut values)?;
+                let first = (pixels.start + start) as u64;
+                places.clear();
+                places.extend(first..first + count as u64);
+                canvas.put(&mut places, &values)?;
             }
             Ok(canvas)
         }
@@ -130,14 +119,14 @@ fn explicit(
     let mut canvas = Canvas::new(grid, table.ordering)?;
     let mut seen = vec![0u64; grid.pixels().div_ceil(64)];
     let indices_per_chunk = (CHUNK / run).max(1);
-    let (mut indices, mut values) = (Vec::new(), Vec::new());
+    let (mut indices, mut values, mut places) = (Vec::new(), Vec::new(), Vec::new());
     for start in (0..total).step_by(indices_per_chunk) {
         let count = indices_per_chunk.min(total - start);
         indices.resize(count, 0);
         values.resize(count * run, 0.0);
         read_integers(fits, table, index, start, &mut indices)?;
         read_values(fits, table, column, start * run, &mut values)?;
-        canvas.places.clear();
+        places.clear();
         for &first in &indices {
             for pixel in first..first + run as i128 {
                 let Some(p) = usize::try_from(pixel).ok().filter(|&p| p < grid.pixels()) else {
@@ -153,10 +142,10 @@ fn explicit(
                     return Err(Error::Duplicate { hdu: table.hdu, pixel: p });
                 }
                 seen[word] |= bit;
-                canvas.places.push(p as u64);
+                places.push(p as u64);
             }
         }
-        canvas.scatter(&values)?;
+        canvas.put(&mut places, &values)?;
     }
     Ok(canvas)
 }
