@@ -78,7 +78,7 @@ fn unpack(mut from: impl Read) -> Result<FitsReader, Error> {
         io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
             Error::Gzip { cause }
         }
-        _ => Error::Io { action: "unpack it to the temporary folder", cause },
+        _ => Error::Io { action: "unpack it to the temporary folder, which TMPDIR names", cause },
     };
     let mut copy = NamedTempFile::new().map_err(unpack_error)?;
     let size = io::copy(&mut from, &mut copy).map_err(unpack_error)?;
