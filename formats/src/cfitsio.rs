@@ -3,32 +3,42 @@
 //! All `unsafe` of this crate is here. What the keywords and columns mean is left to others.
 //!
 //! cfitsio gives file names a syntax of its own (`map.fits[1]`, `map.fits(copy)`, `!map.fits`, `~user`). Users' paths
-//! must not be subject to it, hence the "diskfile" functions and the care of [`c_path`]; compressed data come from
-//! memory, because cfitsio chooses the decompressor by the path.
+//! must not be subject to it, hence the "diskfile" functions and the care of [`c_path`]. It is trusted with nothing
+//! but plain FITS files on disk: it chooses decompressors by the path, and believes headers about the size of files
+//! in memory.
 
-use std::ffi::{CString, c_char, c_int, c_long, c_void};
+use std::ffi::{CString, c_char, c_int, c_long};
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::ptr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use fitsio::sys;
+use tempfile::NamedTempFile;
 
 use crate::Error;
 
-/// An open FITS file.
-pub(crate) struct Fits {
-    handle: *mut sys::fitsfile,
-    /// Size in bytes, uncompressed and without padding that was missing.
+/// cfitsio's side of an open file.
+struct Handle(*mut sys::fitsfile);
+
+/// A FITS file that is read.
+pub(crate) struct FitsReader {
+    handle: Handle,
+    /// The same file, to be looked at without cfitsio.
+    file: File,
+    /// Size in bytes, without padding that was missing.
     size: u64,
-    /// The bytes, where the file is in memory; freed after the handle is closed.
-    _memory: Option<Box<Memory>>,
+    /// The first HDU that has not been visited, and where it begins.
+    next: (usize, i64),
+    /// The file, where it is a temporary one.
+    _temporary: Option<NamedTempFile>,
 }
 
-/// A file in memory, and the addresses that cfitsio keeps of it.
-struct Memory {
-    _bytes: Vec<u8>,
-    start: *mut c_void,
-    len: usize,
+/// A FITS file that is written.
+pub(crate) struct FitsWriter {
+    handle: Handle,
 }
 
 /// The kinds of HDU.
@@ -56,8 +66,8 @@ pub(crate) struct Extent {
 /// The longest path that fits into cfitsio's buffers with all that it appends there.
 const PATH_MAX: usize = 1000;
 
-/// FITS files consist of blocks of this many bytes.
-pub(crate) const BLOCK: usize = 2880;
+/// cfitsio's status for the end of the file where more was expected.
+const END_OF_FILE: c_int = 107;
 
 /// cfitsio's status for a keyword that is not there.
 const KEY_NO_EXIST: c_int = 202;
@@ -71,17 +81,27 @@ fn guard() -> Option<MutexGuard<'static, ()>> {
 }
 
 /// Calls cfitsio and makes its status a `Result`.
-fn call(action: &'static str, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
+fn call(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
     let _guard = guard();
     let mut status = 0;
     function(&mut status);
-    if status == 0 {
-        return Ok(());
+    match status {
+        0 => return Ok(()),
+        END_OF_FILE => return Err(Error::CutShort { action: action.to_string() }),
+        _ => {}
     }
     let mut text = [0 as c_char; sys::FLEN_ERRMSG as usize];
     // SAFETY: the buffer has the length that cfitsio documents (FLEN_STATUS) and more.
     unsafe { sys::ffgerr(status, text.as_mut_ptr()) };
-    Err(Error::Cfitsio { action, status, message: from_c(&text) })
+    Err(Error::Cfitsio { action: action.to_string(), status, message: from_c(&text) })
+}
+
+/// Calls cfitsio to write.
+fn write(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
+    call(action, function).map_err(|e| match e {
+        Error::Cfitsio { action, status, message } => Error::CfitsioWrite { action, status, message },
+        e => e,
+    })
 }
 
 /// The text in a buffer up to its NUL, without FITS's padding and control characters. Headers should be ASCII, but
@@ -110,68 +130,63 @@ fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-impl Fits {
-    /// Opens an uncompressed file.
+impl Drop for Handle {
+    fn drop(&mut self) {
+        if !self.0.is_null() {
+            let _guard = guard();
+            let mut status = 0;
+            // SAFETY: the handle is open and this is its last use. A failure here loses nothing: whoever writes
+            // calls `close`.
+            unsafe { sys::ffclos(self.0, &mut status) };
+        }
+    }
+}
+
+impl FitsReader {
+    /// Opens an existing, uncompressed file of whole blocks.
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
-        // cfitsio would go on to try `path.gz` and others.
-        let size = std::fs::metadata(path).map_err(Error::io("open it"))?.len();
+        // cfitsio would go on to try `path.gz` and others if there were no such file.
+        let file = File::open(path).map_err(Error::io("open it"))?;
+        let size = file.metadata().map_err(Error::io("open it"))?.len();
         let name = c_path(path)?;
         let mut handle = ptr::null_mut();
         // SAFETY: `name` is a C string and `handle` a place for the result, both valid during the call.
         call("open it", |status| unsafe {
             sys::ffdkopn(&mut handle, name.as_ptr(), 0, status);
         })?;
-        Ok(Fits { handle, size, _memory: None })
+        Ok(FitsReader { handle: Handle(handle), file, size, next: (0, 0), _temporary: None })
     }
 
-    /// Opens an uncompressed file that is in memory; the padding of its last block may be missing.
-    pub(crate) fn open_memory(mut bytes: Vec<u8>) -> Result<Self, Error> {
-        let size = bytes.len() as u64;
-        bytes.resize(bytes.len().next_multiple_of(BLOCK), 0);
-        let (start, len) = (bytes.as_mut_ptr().cast(), bytes.len());
-        let mut memory = Box::new(Memory { _bytes: bytes, start, len });
-        let mut handle = ptr::null_mut();
-        // SAFETY: cfitsio keeps the addresses of `start` and `len`, which are boxed and outlive the handle, as do the
-        // bytes. It opens them for reading only (mode 0), so it neither writes to nor reallocates them.
-        call("open it", |status| unsafe {
-            sys::ffomem(&mut handle, c"longan".as_ptr(), 0, &mut memory.start, &mut memory.len, 0, None, status);
-        })?;
-        Ok(Fits { handle, size, _memory: Some(memory) })
+    /// Opens a temporary copy, of which all beyond `size` bytes is padding.
+    pub(crate) fn open_temporary(copy: NamedTempFile, size: u64) -> Result<Self, Error> {
+        let mut reader = FitsReader::open(copy.path())?;
+        reader.size = size;
+        // Where an open file can be removed, nothing is left behind even by a killed process.
+        reader._temporary = if cfg!(unix) { None } else { Some(copy) };
+        Ok(reader)
     }
 
-    /// Creates a file, which must not exist.
-    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
-        let name = c_path(path)?;
-        let mut handle = ptr::null_mut();
-        // SAFETY: as in `open`.
-        call("create it", |status| unsafe {
-            sys::ffdkinit(&mut handle, name.as_ptr(), status);
-        })?;
-        Ok(Fits { handle, size: 0, _memory: None })
-    }
-
-    /// Closes the file; where it was written, this writes what is left.
-    pub(crate) fn close(mut self) -> Result<(), Error> {
-        let handle = std::mem::replace(&mut self.handle, ptr::null_mut());
-        // SAFETY: `handle` is open, and no longer in `self`, so it is closed once.
-        call("finish it", |status| unsafe {
-            sys::ffclos(handle, status);
-        })
-    }
-
-    /// Size in bytes, uncompressed; 0 for a new file.
+    /// Size in bytes, uncompressed and without padding that was missing.
     pub(crate) fn size(&self) -> u64 {
         self.size
     }
 
-    /// Makes an HDU (0 for the primary one) the current one.
+    /// Makes an HDU (0 for the primary one) the current one. HDUs have to be visited in order before any is again.
     pub(crate) fn go(&mut self, hdu: usize) -> Result<HduKind, Error> {
+        let (next, start) = self.next;
+        debug_assert!(hdu <= next);
+        if hdu == next {
+            self.vet(hdu, start)?;
+        }
         let mut kind = 0;
         let number = c_int::try_from(hdu + 1).unwrap_or(c_int::MAX);
         // SAFETY: the handle is open; `kind` outlives the call.
-        call("read the header of the next HDU", |status| unsafe {
-            sys::ffmahd(self.handle, number, &mut kind, status);
+        call(format_args!("read the header of HDU {hdu}"), |status| unsafe {
+            sys::ffmahd(self.handle.0, number, &mut kind, status);
         })?;
+        if hdu == next {
+            self.next = (hdu + 1, self.extent()?.end);
+        }
         Ok(match kind {
             1 => HduKind::TextTable,
             2 => HduKind::Table,
@@ -179,12 +194,38 @@ impl Fits {
         })
     }
 
+    /// Looks for sizes in the first lines of a header that cfitsio takes badly: where a table has not from 0 to 999
+    /// columns, or a negative size, it goes on with that number of columns, or one that is not initialised.
+    fn vet(&mut self, hdu: usize, start: i64) -> Result<(), Error> {
+        let mut cards = Vec::new();
+        self.file
+            .seek(SeekFrom::Start(start as u64))
+            .and_then(|_| self.file.by_ref().take(8 * 80).read_to_end(&mut cards))
+            .map_err(Error::io("read it"))?;
+        if !cards.starts_with(b"XTENSION") {
+            return Ok(());
+        }
+        for card in cards.chunks_exact(80) {
+            for (key, max) in [("NAXIS1", i64::MAX), ("NAXIS2", i64::MAX), ("TFIELDS", 999)] {
+                if card.starts_with(format!("{key:<8}=").as_bytes()) {
+                    let text = String::from_utf8_lossy(&card[9..]);
+                    let value = text.split('/').next().unwrap_or_default().trim();
+                    if !value.parse().is_ok_and(|value: i64| (0..=max).contains(&value)) {
+                        let value = value.replace(char::is_control, " ");
+                        return Err(Error::Keyword { hdu, key: key.to_owned(), value, expected: "a possible size" });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Where the current HDU lies.
     pub(crate) fn extent(&mut self) -> Result<Extent, Error> {
         let (mut header, mut data, mut end) = (0, 0, 0);
         // SAFETY: the handle is open; the results outlive the call.
         call("find the data", |status| unsafe {
-            sys::ffghadll(self.handle, &mut header, &mut data, &mut end, status);
+            sys::ffghadll(self.handle.0, &mut header, &mut data, &mut end, status);
         })?;
         Ok(Extent { header, data, end })
     }
@@ -195,8 +236,8 @@ impl Fits {
         let mut value = [0 as c_char; sys::FLEN_VALUE as usize];
         let mut comment = [0 as c_char; sys::FLEN_COMMENT as usize];
         // SAFETY: the handle is open; the buffers have the documented lengths.
-        let found = call("read a keyword", |status| unsafe {
-            sys::ffgkey(self.handle, name.as_ptr(), value.as_mut_ptr(), comment.as_mut_ptr(), status);
+        let found = call(format_args!("read the keyword {key}"), |status| unsafe {
+            sys::ffgkey(self.handle.0, name.as_ptr(), value.as_mut_ptr(), comment.as_mut_ptr(), status);
         });
         match found {
             Ok(()) => Ok(Some(from_c(&value))),
@@ -210,7 +251,7 @@ impl Fits {
         let mut columns = 0;
         // SAFETY: the handle is open; `columns` outlives the call.
         call("count the columns", |status| unsafe {
-            sys::ffgncl(self.handle, &mut columns, status);
+            sys::ffgncl(self.handle.0, &mut columns, status);
         })?;
         Ok(columns)
     }
@@ -219,8 +260,8 @@ impl Fits {
     pub(crate) fn column_type(&mut self, column: c_int) -> Result<(c_int, i64, i64), Error> {
         let (mut code, mut repeat, mut width) = (0, 0, 0);
         // SAFETY: the handle is open; the results outlive the call.
-        call("read the type of a column", |status| unsafe {
-            sys::ffgtclll(self.handle, column, &mut code, &mut repeat, &mut width, status);
+        call(format_args!("read the type of column {column}"), |status| unsafe {
+            sys::ffgtclll(self.handle.0, column, &mut code, &mut repeat, &mut width, status);
         })?;
         Ok((code, repeat, width))
     }
@@ -228,8 +269,8 @@ impl Fits {
     /// Sets the scaling of a column, in place of TSCAL and TZERO.
     pub(crate) fn set_scaling(&mut self, column: c_int, scale: f64, zero: f64) -> Result<(), Error> {
         // SAFETY: the handle is open.
-        call("scale a column", |status| unsafe {
-            sys::fftscl(self.handle, column, scale, zero, status);
+        call(format_args!("scale column {column}"), |status| unsafe {
+            sys::fftscl(self.handle.0, column, scale, zero, status);
         })
     }
 
@@ -246,9 +287,9 @@ impl Fits {
         let null = if nulls { f64::NAN } else { 0.0 };
         let mut any = 0;
         // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails, and sets `any`.
-        call("read a column", |status| unsafe {
+        call(format_args!("read column {column}"), |status| unsafe {
             sys::ffgcvd(
-                self.handle,
+                self.handle.0,
                 column,
                 row as i64 + 1,
                 element as i64 + 1,
@@ -270,9 +311,9 @@ impl Fits {
     ) -> Result<(), Error> {
         let mut any = 0;
         // SAFETY: the handle is open; cfitsio writes `out.len()` elements or fails, and sets `any`.
-        call("read a column of integers", |status| unsafe {
+        call(format_args!("read column {column} of integers"), |status| unsafe {
             sys::ffgcvjj(
-                self.handle,
+                self.handle.0,
                 column,
                 row as i64 + 1,
                 element as i64 + 1,
@@ -295,9 +336,9 @@ impl Fits {
         let mut nulls = vec![0 as c_char; out.len()];
         let mut any = 0;
         // SAFETY: the handle is open; cfitsio writes `out.len()` elements to each of the two arrays or fails.
-        call("read a column of truth values", |status| unsafe {
+        call(format_args!("read column {column} of truth values"), |status| unsafe {
             sys::ffgcfl(
-                self.handle,
+                self.handle.0,
                 column,
                 row as i64 + 1,
                 element as i64 + 1,
@@ -315,13 +356,35 @@ impl Fits {
         }
         Ok(())
     }
+}
+
+impl FitsWriter {
+    /// Creates a file, which must not exist.
+    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
+        let name = c_path(path)?;
+        let mut handle = ptr::null_mut();
+        // SAFETY: `name` is a C string and `handle` a place for the result, both valid during the call.
+        write("create it", |status| unsafe {
+            sys::ffdkinit(&mut handle, name.as_ptr(), status);
+        })?;
+        Ok(FitsWriter { handle: Handle(handle) })
+    }
+
+    /// Writes what is left and closes the file.
+    pub(crate) fn close(mut self) -> Result<(), Error> {
+        let handle = std::mem::replace(&mut self.handle.0, ptr::null_mut());
+        // SAFETY: `handle` is open, and no longer in `self`, so it is closed once.
+        write("finish it", |status| unsafe {
+            sys::ffclos(handle, status);
+        })
+    }
 
     /// Writes an empty primary HDU.
     pub(crate) fn write_primary(&mut self) -> Result<(), Error> {
         let mut axes: [c_long; 1] = [0];
         // SAFETY: the handle is open for writing; no axis is read where their number is 0.
-        call("write the primary header", |status| unsafe {
-            sys::ffcrim(self.handle, 8, 0, axes.as_mut_ptr(), status);
+        write("write the primary header", |status| unsafe {
+            sys::ffcrim(self.handle.0, 8, 0, axes.as_mut_ptr(), status);
         })
     }
 
@@ -333,9 +396,9 @@ impl Fits {
         let name = c_text(name);
         // SAFETY: the handle is open for writing; each array has as many C strings as there are columns, which
         // cfitsio reads during the call only.
-        call("write the header of a table", |status| unsafe {
+        write("write the header of a table", |status| unsafe {
             sys::ffcrtb(
-                self.handle,
+                self.handle.0,
                 2,
                 rows as i64,
                 columns.len() as c_int,
@@ -354,9 +417,9 @@ impl Fits {
         let mut value = c_text(value).into_bytes_with_nul();
         let mut card = [0 as c_char; sys::FLEN_CARD as usize];
         // SAFETY: the handle is open for writing; all texts are C strings and `card` has the documented length.
-        call("write a header entry", |status| unsafe {
+        write("write a header entry", |status| unsafe {
             sys::ffmkky(key.as_ptr(), value.as_mut_ptr().cast(), comment.as_ptr(), card.as_mut_ptr(), status);
-            sys::ffprec(self.handle, card.as_ptr(), status);
+            sys::ffprec(self.handle.0, card.as_ptr(), status);
         })
     }
 
@@ -364,16 +427,16 @@ impl Fits {
     pub(crate) fn write_text(&mut self, key: &str, value: &str, comment: &str) -> Result<(), Error> {
         let (key, value, comment) = (c_text(key), c_text(value), c_text(comment));
         // SAFETY: the handle is open for writing; all texts are C strings.
-        call("write a header entry", |status| unsafe {
-            sys::ffpkls(self.handle, key.as_ptr(), value.as_ptr(), comment.as_ptr(), status);
+        write("write a header entry", |status| unsafe {
+            sys::ffpkls(self.handle.0, key.as_ptr(), value.as_ptr(), comment.as_ptr(), status);
         })
     }
 
     /// Appends the entry that announces texts over several lines.
     pub(crate) fn write_long_text_notice(&mut self) -> Result<(), Error> {
         // SAFETY: the handle is open for writing.
-        call("write a header entry", |status| unsafe {
-            sys::ffplsw(self.handle, status);
+        write("write a header entry", |status| unsafe {
+            sys::ffplsw(self.handle.0, status);
         })
     }
 
@@ -381,12 +444,13 @@ impl Fits {
     pub(crate) fn write_history(&mut self, text: &str) -> Result<(), Error> {
         let text = c_text(text);
         // SAFETY: the handle is open for writing; the text is a C string.
-        call("write a header entry", |status| unsafe {
-            sys::ffphis(self.handle, text.as_ptr(), status);
+        write("write a header entry", |status| unsafe {
+            sys::ffphis(self.handle.0, text.as_ptr(), status);
         })
     }
 
-    /// Writes numbers to a column, counted from 1, from element `first` of the column (counted from 0) on.
+    /// Writes numbers to a column, counted from 1, from row `row` and element `element` in it
+    /// on (counted from 0).
     pub(crate) fn write_f64(
         &mut self,
         column: c_int,
@@ -394,9 +458,9 @@ impl Fits {
         values: &mut [f64],
     ) -> Result<(), Error> {
         // SAFETY: the handle is open for writing; cfitsio reads `values.len()` elements.
-        call("write a column", |status| unsafe {
+        write(format_args!("write column {column}"), |status| unsafe {
             sys::ffpcld(
-                self.handle,
+                self.handle.0,
                 column,
                 row as i64 + 1,
                 element as i64 + 1,
@@ -415,9 +479,9 @@ impl Fits {
         values: &mut [f32],
     ) -> Result<(), Error> {
         // SAFETY: the handle is open for writing; cfitsio reads `values.len()` elements.
-        call("write a column", |status| unsafe {
+        write(format_args!("write column {column}"), |status| unsafe {
             sys::ffpcle(
-                self.handle,
+                self.handle.0,
                 column,
                 row as i64 + 1,
                 element as i64 + 1,
@@ -426,17 +490,5 @@ impl Fits {
                 status,
             );
         })
-    }
-}
-
-impl Drop for Fits {
-    fn drop(&mut self) {
-        if !self.handle.is_null() {
-            let _guard = guard();
-            let mut status = 0;
-            // SAFETY: the handle is open and this is its last use. A failure here loses nothing: whoever writes
-            // calls `close`.
-            unsafe { sys::ffclos(self.handle, &mut status) };
-        }
     }
 }

@@ -84,11 +84,29 @@ pub enum Error {
     #[error("cannot {action}: the FITS library says \"{message}\" (status {status}); check the file with fitsverify")]
     Cfitsio {
         /// What was attempted.
-        action: &'static str,
+        action: String,
         /// cfitsio's status.
         status: i32,
         /// cfitsio's words for it.
         message: String,
+    },
+    /// The FITS library could not write.
+    #[error(
+        "cannot {action}: the FITS library says \"{message}\" (status {status}); check the space and the permissions there"
+    )]
+    CfitsioWrite {
+        /// What was attempted.
+        action: String,
+        /// cfitsio's status.
+        status: i32,
+        /// cfitsio's words for it.
+        message: String,
+    },
+    /// A file that ends within a header.
+    #[error("cannot {action}: the file ends before it; fetch it again")]
+    CutShort {
+        /// What was attempted.
+        action: String,
     },
     /// A damaged gzip stream.
     #[error("the gzip stream is damaged or cut short ({cause}); fetch the file again")]

@@ -1,7 +1,7 @@
 //! HEALPix maps in FITS files.
 //!
 //! [`table`] understands headers, [`read`] fetches values, [`multi_order`] brings cells of several sizes to one grid,
-//! [`write`] makes files. The bytes themselves are left to [`crate::cfitsio`].
+//! [`mod@write`] makes files. The bytes themselves are left to [`crate::cfitsio`].
 
 mod multi_order;
 mod read;
@@ -10,16 +10,20 @@ mod table;
 mod write;
 
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-use flate2::read::MultiGzDecoder;
+use flate2::bufread::MultiGzDecoder;
+use tempfile::NamedTempFile;
 
 use crate::adapter::{gunzipped_head, is_gzip};
-use crate::cfitsio::{BLOCK, Fits};
+use crate::cfitsio::FitsReader;
 use crate::{Adapter, Description, Error, Map, Selection};
 
 pub use write::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
+
+/// FITS files consist of blocks of this many bytes.
+const BLOCK: u64 = 2880;
 
 /// The adapter for HEALPix maps in FITS files, plain or gzip-compressed.
 pub(crate) struct HealpixFits;
@@ -51,21 +55,33 @@ impl Adapter for HealpixFits {
     }
 }
 
-/// Opens a FITS file: in memory where it is a gzip stream or its last block is cut, neither of which cfitsio reads
-/// reliably from disk.
-fn open(path: &Path) -> Result<Fits, Error> {
+/// Opens a FITS file. One that is gzip-compressed or whose last block is cut is copied to a temporary file.
+fn open(path: &Path) -> Result<FitsReader, Error> {
     let mut file = File::open(path).map_err(Error::io("open it"))?;
-    let mut bytes = Vec::new();
-    file.by_ref().take(2).read_to_end(&mut bytes).map_err(Error::io("read it"))?;
-    if is_gzip(&bytes) {
-        let stream = BufReader::with_capacity(1 << 18, Cursor::new(bytes).chain(file));
-        let mut bytes = Vec::new();
-        MultiGzDecoder::new(stream).read_to_end(&mut bytes).map_err(|cause| Error::Gzip { cause })?;
-        Fits::open_memory(bytes)
-    } else if file.metadata().map_err(Error::io("read it"))?.len().is_multiple_of(BLOCK as u64) {
-        Fits::open(path)
+    let size = file.metadata().map_err(Error::io("open it"))?.len();
+    let mut magic = Vec::new();
+    file.by_ref().take(2).read_to_end(&mut magic).map_err(Error::io("read it"))?;
+    let whole = magic.as_slice().chain(BufReader::with_capacity(1 << 17, file));
+    if is_gzip(&magic) {
+        unpack(MultiGzDecoder::new(whole))
+    } else if size.is_multiple_of(BLOCK) {
+        FitsReader::open(path)
     } else {
-        file.read_to_end(&mut bytes).map_err(Error::io("read it"))?;
-        Fits::open_memory(bytes)
+        unpack(whole)
     }
+}
+
+/// Opens a temporary file of the same content.
+fn unpack(mut from: impl Read) -> Result<FitsReader, Error> {
+    let unpack_error = |cause: io::Error| match cause.kind() {
+        // What the decompressor says, but never the operating system.
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+            Error::Gzip { cause }
+        }
+        _ => Error::Io { action: "unpack it to the temporary folder, which TMPDIR names", cause },
+    };
+    let mut copy = NamedTempFile::new().map_err(unpack_error)?;
+    let size = io::copy(&mut from, &mut copy).map_err(unpack_error)?;
+    copy.as_file().set_len(size.next_multiple_of(BLOCK)).map_err(unpack_error)?;
+    FitsReader::open_temporary(copy, size)
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::read::{CHUNK, Canvas, read_integers, read_values};
 use super::table::{Column, Table};
-use crate::cfitsio::Fits;
+use crate::cfitsio::FitsReader;
 use crate::{Error, Healpix, Ordering};
 
 /// The finest order of HEALPix, and so of UNIQ numbers.
@@ -56,16 +56,16 @@ fn place(uniq: i128) -> Option<u64> {
 
 /// Calls `each` with the place of every cell in chunks, in the table's order, and the number of the first of them.
 fn for_places(
-    fits: &mut Fits,
+    fits: &mut FitsReader,
     table: &Table,
     index: &Column,
-    mut each: impl FnMut(&mut Fits, usize, &[u64]) -> Result<(), Error>,
+    mut each: impl FnMut(&mut FitsReader, usize, &[u64]) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let total = table.rows * index.repeat;
     let (mut uniqs, mut places) = (Vec::new(), Vec::new());
     for start in (0..total).step_by(CHUNK) {
         uniqs.resize(CHUNK.min(total - start), 0);
-        read_integers(fits, index, start, &mut uniqs)?;
+        read_integers(fits, table, index, start, &mut uniqs)?;
         places.clear();
         for (i, &uniq) in (start..).zip(&uniqs) {
             let row = i / index.repeat + 1;
@@ -77,7 +77,7 @@ fn for_places(
 }
 
 /// Nside of the finest cells.
-pub(super) fn finest(fits: &mut Fits, table: &Table, index: &Column) -> Result<usize, Error> {
+pub(super) fn finest(fits: &mut FitsReader, table: &Table, index: &Column) -> Result<usize, Error> {
     let mut order = 0;
     for_places(fits, table, index, |_, _, places| {
         let finest = places.iter().map(|&place| Cell { place, value: 0.0 }.order()).max();
@@ -92,7 +92,7 @@ pub(super) fn finest(fits: &mut Fits, table: &Table, index: &Column) -> Result<u
 /// A pixel gets the mean over the cells in it, weighted by their area and without those that are masked; a pixel
 /// within a cell gets the cell's value.
 pub(super) fn read(
-    fits: &mut Fits,
+    fits: &mut FitsReader,
     table: &Table,
     column: &Column,
     index: &Column,
@@ -131,19 +131,19 @@ pub(super) fn read(
     };
     let depth = u32::from(grid.depth()?);
     let mut canvas = Canvas::new(grid, Ordering::Nested)?;
-    let mut run = Run { first: 0, values: Vec::with_capacity(CHUNK) };
+    let mut batch = Batch { canvas: &mut canvas, places: Vec::with_capacity(CHUNK), values: Vec::with_capacity(CHUNK) };
     let mut mean = Mean { pixel: 0, first: 0.0, sum: 0.0, weight: 0.0 };
     for cell in &cells {
         if cell.order() <= depth {
             let children = 2 * (depth - cell.order());
             for pixel in cell.pixel() << children..(cell.pixel() + 1) << children {
-                run.push(&mut canvas, pixel, cell.value)?;
+                batch.push(pixel, cell.value)?;
             }
         } else {
             let parents = 2 * (cell.order() - depth);
             let pixel = cell.pixel() >> parents;
             if mean.pixel != pixel {
-                mean.flush(&mut run, &mut canvas)?;
+                mean.flush(&mut batch)?;
                 mean.pixel = pixel;
             }
             if !cell.value.is_nan() {
@@ -151,8 +151,8 @@ pub(super) fn read(
             }
         }
     }
-    mean.flush(&mut run, &mut canvas)?;
-    run.flush(&mut canvas)?;
+    mean.flush(&mut batch)?;
+    batch.flush()?;
     Ok(canvas)
 }
 
@@ -174,33 +174,35 @@ impl Mean {
         self.weight += weight;
     }
 
-    fn flush(&mut self, run: &mut Run, canvas: &mut Canvas) -> Result<(), Error> {
+    fn flush(&mut self, batch: &mut Batch<'_>) -> Result<(), Error> {
         if self.weight > 0.0 {
-            run.push(canvas, self.pixel, self.first + self.sum / self.weight)?;
+            batch.push(self.pixel, self.first + self.sum / self.weight)?;
             (self.sum, self.weight) = (0.0, 0.0);
         }
         Ok(())
     }
 }
 
-/// Consecutive pixels that are put onto the canvas together.
-struct Run {
-    first: u64,
+/// Pixels that are put onto the canvas together.
+struct Batch<'a> {
+    canvas: &'a mut Canvas,
+    places: Vec<u64>,
     values: Vec<f64>,
 }
 
-impl Run {
-    fn push(&mut self, canvas: &mut Canvas, pixel: u64, value: f64) -> Result<(), Error> {
-        if pixel != self.first + self.values.len() as u64 || self.values.len() == CHUNK {
-            self.flush(canvas)?;
-            self.first = pixel;
+impl Batch<'_> {
+    fn push(&mut self, pixel: u64, value: f64) -> Result<(), Error> {
+        if self.places.len() == CHUNK {
+            self.flush()?;
         }
+        self.places.push(pixel);
         self.values.push(value);
         Ok(())
     }
 
-    fn flush(&mut self, canvas: &mut Canvas) -> Result<(), Error> {
-        canvas.put_run(self.first as usize, &self.values)?;
+    fn flush(&mut self) -> Result<(), Error> {
+        self.canvas.put(&mut self.places, &self.values)?;
+        self.places.clear();
         self.values.clear();
         Ok(())
     }

@@ -5,15 +5,15 @@
 use rayon::prelude::*;
 
 use super::multi_order;
-use super::table::{Column, Kind, Layout, Table};
-use crate::cfitsio::Fits;
+use super::table::{self, Column, Kind, Layout, Table};
+use crate::cfitsio::FitsReader;
 use crate::{Error, Healpix, Map, Ordering, Selection, UNSEEN, is_bad};
 
 /// Values per call to cfitsio: many enough that calls cost nothing, few enough to stay in the cache.
 pub(super) const CHUNK: usize = 1 << 17;
 
 /// Reads one field of a table.
-pub(super) fn read(fits: &mut Fits, table: &Table, selection: &Selection) -> Result<Map, Error> {
+pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) -> Result<Map, Error> {
     let column = table.column(selection.field.as_ref())?;
     if let (Some(nside), Layout::Implicit { .. } | Layout::Explicit { .. }) = (selection.nside, &table.layout) {
         return Err(Error::NotMultiOrder { hdu: table.hdu, nside });
@@ -36,8 +36,6 @@ pub(super) struct Canvas {
     grid: Healpix,
     ordering: Ordering,
     values: Vec<f64>,
-    /// Where the values of one chunk go.
-    places: Vec<u64>,
 }
 
 impl Canvas {
@@ -55,36 +53,28 @@ impl Canvas {
             nside: grid.nside(),
             gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
         })?;
-        Ok(Canvas { grid, ordering, values, places: Vec::new() })
+        Ok(Canvas { grid, ordering, values })
     }
 
-    /// Sets consecutive pixels from `first` on.
-    pub(super) fn put_run(&mut self, first: usize, run: &[f64]) -> Result<(), Error> {
-        match self.ordering {
-            Ordering::Ring => self.values[first..first + run.len()].copy_from_slice(run),
-            Ordering::Nested => {
-                self.places.clear();
-                self.places.extend(first as u64..(first + run.len()) as u64);
-                self.scatter(run)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Sets the pixels that `places` holds.
-    fn scatter(&mut self, values: &[f64]) -> Result<(), Error> {
+    /// Sets some pixels, named by `places` in the file's ordering, which this overwrites.
+    pub(super) fn put(&mut self, places: &mut [u64], values: &[f64]) -> Result<(), Error> {
         if self.ordering == Ordering::Nested {
             let layer = cdshealpix::nested::get(self.grid.depth()?);
-            self.places.par_iter_mut().for_each(|p| *p = layer.to_ring(*p));
+            places.par_iter_mut().for_each(|p| *p = layer.to_ring(*p));
         }
-        for (&place, &value) in self.places.iter().zip(values) {
+        for (&place, &value) in places.iter().zip(values) {
             self.values[place as usize] = value;
         }
         Ok(())
     }
 }
 
-fn implicit(fits: &mut Fits, table: &Table, column: &Column, named: Option<(usize, usize)>) -> Result<Canvas, Error> {
+fn implicit(
+    fits: &mut FitsReader,
+    table: &Table,
+    column: &Column,
+    named: Option<(usize, usize)>,
+) -> Result<Canvas, Error> {
     let (grid, pixels) = table.implicit(column, named)?;
     let chunks = (0..pixels.len()).step_by(CHUNK).map(|start| (start, CHUNK.min(pixels.len() - start)));
     match table.ordering {
@@ -102,31 +92,41 @@ fn implicit(fits: &mut Fits, table: &Table, column: &Column, named: Option<(usiz
         }
         Ordering::Nested => {
             let mut canvas = Canvas::new(grid, table.ordering)?;
-            let mut buffer = vec![0.0; CHUNK.min(pixels.len())];
+            let (mut values, mut places) = (Vec::new(), Vec::new());
             for (start, count) in chunks {
-                read_values(fits, table, column, start, &mut buffer[..count])?;
-                canvas.put_run(pixels.start + start, &buffer[..count])?;
+                values.resize(count, 0.0);
+                read_values(fits, table, column, start, &mut values)?;
+                let first = (pixels.start + start) as u64;
+                places.clear();
+                places.extend(first..first + count as u64);
+                canvas.put(&mut places, &values)?;
             }
             Ok(canvas)
         }
     }
 }
 
-fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, grain: usize) -> Result<Canvas, Error> {
+fn explicit(
+    fits: &mut FitsReader,
+    table: &Table,
+    column: &Column,
+    index: &Column,
+    grain: usize,
+) -> Result<Canvas, Error> {
     let grid = table.explicit_grid(index)?;
     let run = table.run(column, index, grain)?;
     let total = table.rows * index.repeat;
     let mut canvas = Canvas::new(grid, table.ordering)?;
     let mut seen = vec![0u64; grid.pixels().div_ceil(64)];
     let indices_per_chunk = (CHUNK / run).max(1);
-    let (mut indices, mut values) = (Vec::new(), Vec::new());
+    let (mut indices, mut values, mut places) = (Vec::new(), Vec::new(), Vec::new());
     for start in (0..total).step_by(indices_per_chunk) {
         let count = indices_per_chunk.min(total - start);
         indices.resize(count, 0);
         values.resize(count * run, 0.0);
-        read_integers(fits, index, start, &mut indices)?;
+        read_integers(fits, table, index, start, &mut indices)?;
         read_values(fits, table, column, start * run, &mut values)?;
-        canvas.places.clear();
+        places.clear();
         for &first in &indices {
             for pixel in first..first + run as i128 {
                 let Some(p) = usize::try_from(pixel).ok().filter(|&p| p < grid.pixels()) else {
@@ -142,17 +142,17 @@ fn explicit(fits: &mut Fits, table: &Table, column: &Column, index: &Column, gra
                     return Err(Error::Duplicate { hdu: table.hdu, pixel: p });
                 }
                 seen[word] |= bit;
-                canvas.places.push(p as u64);
+                places.push(p as u64);
             }
         }
-        canvas.scatter(&values)?;
+        canvas.put(&mut places, &values)?;
     }
     Ok(canvas)
 }
 
 /// Reads values of a column from its `start`-th on (counted over all rows); all that mean "no value" become NaN.
 pub(super) fn read_values(
-    fits: &mut Fits,
+    fits: &mut FitsReader,
     table: &Table,
     column: &Column,
     start: usize,
@@ -198,10 +198,25 @@ fn mask(values: &mut [f64], bad_data: Option<f64>) {
 }
 
 /// Reads integers of a column from its `start`-th on (counted over all rows), unsigned ones included.
-pub(super) fn read_integers(fits: &mut Fits, column: &Column, start: usize, out: &mut [i128]) -> Result<(), Error> {
+pub(super) fn read_integers(
+    fits: &mut FitsReader,
+    table: &Table,
+    column: &Column,
+    start: usize,
+    out: &mut [i128],
+) -> Result<(), Error> {
     // cfitsio applies TZERO in 64 bits or in floating point, neither of which holds every unsigned number.
-    let mut scaling = |key: &str| super::table::number(fits, &format!("{key}{}", column.number));
-    let (scale, zero) = (scaling("TSCAL")?.unwrap_or(1.0) as i128, scaling("TZERO")?.unwrap_or(0.0) as i128);
+    let mut scaling = |key: &str, default: i128| {
+        let key = format!("{key}{}", column.number);
+        match table::number(fits, &key)? {
+            None => Ok(default),
+            Some(value) if value.fract() == 0.0 && value.abs() <= 2f64.powi(63) => Ok(value as i128),
+            Some(value) => {
+                Err(table::bad_key(table.hdu, &key, value, "a whole number of 64 bits, as pixel numbers need"))
+            }
+        }
+    };
+    let (scale, zero) = (scaling("TSCAL", 1)?, scaling("TZERO", 0)?);
     fits.set_scaling(column.number, 1.0, 0.0)?;
     let mut raw = vec![0; out.len()];
     fits.read_i64(column.number, (start / column.repeat, start % column.repeat), &mut raw)?;

@@ -4,7 +4,7 @@
 
 use super::table::{self, Likeness};
 use crate::Error;
-use crate::cfitsio::{Fits, HduKind};
+use crate::cfitsio::{FitsReader, HduKind};
 
 /// One HDU at a glance.
 struct Hdu {
@@ -16,7 +16,7 @@ struct Hdu {
 }
 
 /// The number of the HDU to read: the one asked for, else the first HEALPix table.
-pub(super) fn choose(fits: &mut Fits, asked: Option<usize>) -> Result<usize, Error> {
+pub(super) fn choose(fits: &mut FitsReader, asked: Option<usize>) -> Result<usize, Error> {
     let Some(number) = asked else {
         return healpix_tables(fits).map(|tables| tables[0]);
     };
@@ -39,7 +39,7 @@ pub(super) fn choose(fits: &mut Fits, asked: Option<usize>) -> Result<usize, Err
 /// The numbers of all HDUs that are HEALPix tables, at least one.
 ///
 /// Tables that merely have as many values as a map has pixels count only where no table says that it is one.
-pub(super) fn healpix_tables(fits: &mut Fits) -> Result<Vec<usize>, Error> {
+pub(super) fn healpix_tables(fits: &mut FitsReader) -> Result<Vec<usize>, Error> {
     let (hdus, damage) = scan(fits)?;
     for likeness in [Likeness::Marked, Likeness::Shaped] {
         let tables: Vec<_> = hdus.iter().filter(|h| h.likeness == likeness).map(|h| h.number).collect();
@@ -52,7 +52,7 @@ pub(super) fn healpix_tables(fits: &mut Fits) -> Result<Vec<usize>, Error> {
 }
 
 /// All HDUs up to the end of the file or the first that cannot be read, and why it cannot.
-fn scan(fits: &mut Fits) -> Result<(Vec<Hdu>, Option<Error>), Error> {
+fn scan(fits: &mut FitsReader) -> Result<(Vec<Hdu>, Option<Error>), Error> {
     let mut hdus = Vec::new();
     // Headers with absurd sizes could lead in circles, so each HDU has to begin where the last one has ended.
     let mut end = 0;
@@ -71,7 +71,7 @@ fn scan(fits: &mut Fits) -> Result<(Vec<Hdu>, Option<Error>), Error> {
     Ok((hdus, None))
 }
 
-fn glance(fits: &mut Fits, number: usize) -> Result<(Hdu, crate::cfitsio::Extent), Error> {
+fn glance(fits: &mut FitsReader, number: usize) -> Result<(Hdu, crate::cfitsio::Extent), Error> {
     let kind = fits.go(number)?;
     let extent = fits.extent()?;
     let mut likeness = Likeness::None;

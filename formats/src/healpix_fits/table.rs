@@ -7,7 +7,7 @@ use std::ffi::c_int;
 use std::ops::Range;
 
 use super::multi_order;
-use crate::cfitsio::Fits;
+use crate::cfitsio::FitsReader;
 use crate::{CoordinateSystem, Error, Field, FieldDescription, Healpix, Indexing, Ordering, TableDescription};
 
 /// A HEALPix table.
@@ -47,6 +47,8 @@ pub(super) struct Column {
     pub(super) kind: Kind,
     /// Values per row.
     pub(super) repeat: usize,
+    /// Bytes per value.
+    width: usize,
 }
 
 /// What a column holds.
@@ -82,7 +84,7 @@ const INDEX_NAMES: [&str; 9] =
 const UNIQ: &str = "UNIQ";
 
 /// How much the current HDU, a table, looks like HEALPix.
-pub(super) fn likeness(fits: &mut Fits) -> Result<Likeness, Error> {
+pub(super) fn likeness(fits: &mut FitsReader) -> Result<Likeness, Error> {
     if text(fits, "PIXTYPE")?.is_some_and(|pixels| pixels.eq_ignore_ascii_case("HEALPIX")) {
         return Ok(Likeness::Marked);
     }
@@ -91,7 +93,7 @@ pub(super) fn likeness(fits: &mut Fits) -> Result<Likeness, Error> {
             return Ok(Likeness::Marked);
         }
     }
-    let columns = columns(fits)?;
+    let columns = columns(fits).unwrap_or_default();
     if columns.iter().any(|c| c.is_index() && c.name.eq_ignore_ascii_case(UNIQ)) {
         return Ok(Likeness::Marked);
     }
@@ -102,10 +104,17 @@ pub(super) fn likeness(fits: &mut Fits) -> Result<Likeness, Error> {
 
 impl Table {
     /// Understands the header of an HDU, which is a binary table and becomes the current one.
-    pub(super) fn parse(fits: &mut Fits, hdu: usize) -> Result<Self, Error> {
+    pub(super) fn parse(fits: &mut FitsReader, hdu: usize) -> Result<Self, Error> {
         fits.go(hdu)?;
-        let rows = check_size(fits, hdu)?;
+        let (rows, width) = check_size(fits, hdu)?;
         let mut columns = columns(fits)?;
+        for column in &columns {
+            // What is read is sized by the columns, and cfitsio lets some absurd ones pass.
+            if column.bytes() > width {
+                let (key, value) = (format!("TFORM{}", column.number), column.repeat);
+                return Err(bad_key(hdu, &key, value, "a number of values that fits into a row of NAXIS1 bytes"));
+            }
+        }
 
         let scheme = text(fits, "INDXSCHM")?.map(|s| s.to_ascii_uppercase());
         let (ordering, ordering_assumed, uniq) = match text(fits, "ORDERING")? {
@@ -143,7 +152,8 @@ impl Table {
         if let (Some(grid), Ordering::Nested) = (grid, ordering) {
             grid.depth()?;
         }
-        let count = |fits: &mut Fits, key| Ok::<_, Error>(whole(fits, hdu, key)?.and_then(|n| usize::try_from(n).ok()));
+        let count =
+            |fits: &mut FitsReader, key| Ok::<_, Error>(whole(fits, hdu, key)?.and_then(|n| usize::try_from(n).ok()));
         let layout = match index {
             Some(index) if uniq => Layout::MultiOrder { index },
             Some(index) if grid.is_none() => return Err(Error::NsideOfIndices { hdu, column: index.name }),
@@ -165,7 +175,7 @@ impl Table {
     }
 
     /// What the table holds, for people.
-    pub(super) fn describe(&self, fits: &mut Fits) -> Result<TableDescription, Error> {
+    pub(super) fn describe(&self, fits: &mut FitsReader) -> Result<TableDescription, Error> {
         let column = self.columns.iter().find(|c| c.check(self.hdu).is_ok()).unwrap_or(&self.columns[0]);
         let (indexing, nside, pixels) = match &self.layout {
             Layout::Implicit { named } => {
@@ -279,6 +289,15 @@ impl Table {
 }
 
 impl Column {
+    /// Bytes per row.
+    fn bytes(&self) -> u128 {
+        match self.kind {
+            Kind::Bits => self.repeat.div_ceil(8) as u128,
+            Kind::Other(_) => 0,
+            _ => self.repeat as u128 * self.width as u128,
+        }
+    }
+
     /// Whether it could hold pixel numbers.
     fn is_index(&self) -> bool {
         matches!(self.kind, Kind::Integer { .. }) && self.repeat > 0
@@ -292,8 +311,8 @@ impl Column {
     }
 }
 
-/// The rows of the current table, once it is clear that the file has all their bytes.
-fn check_size(fits: &mut Fits, hdu: usize) -> Result<usize, Error> {
+/// The rows of the current table and their length in bytes, once it is clear that the file has all of them.
+fn check_size(fits: &mut FitsReader, hdu: usize) -> Result<(usize, u128), Error> {
     let data = fits.extent()?.data;
     let mut side = |key| {
         let value = whole(fits, hdu, key)?.unwrap_or(0);
@@ -304,14 +323,15 @@ fn check_size(fits: &mut Fits, hdu: usize) -> Result<usize, Error> {
     if needed > u128::from(fits.size()) {
         return Err(Error::Truncated { hdu, needed, found: fits.size() });
     }
-    usize::try_from(rows).map_err(|_| bad_key(hdu, "NAXIS2", rows, "a size"))
+    let rows = usize::try_from(rows).map_err(|_| bad_key(hdu, "NAXIS2", rows, "a size"))?;
+    Ok((rows, width.into()))
 }
 
 /// The columns of the current table.
-fn columns(fits: &mut Fits) -> Result<Vec<Column>, Error> {
+fn columns(fits: &mut FitsReader) -> Result<Vec<Column>, Error> {
     (1..=fits.columns()?)
         .map(|number| {
-            let (code, repeat, _) = fits.column_type(number)?;
+            let (code, repeat, width) = fits.column_type(number)?;
             let kind = match code {
                 _ if repeat == 0 => Kind::Other("empty"),
                 1 => Kind::Bits,
@@ -329,24 +349,25 @@ fn columns(fits: &mut Fits) -> Result<Vec<Column>, Error> {
                 unit: text(fits, &format!("TUNIT{number}"))?,
                 kind,
                 repeat: usize::try_from(repeat).unwrap_or(0),
+                width: usize::try_from(width).unwrap_or(0),
             })
         })
         .collect()
 }
 
 /// The grid that the keyword NSIDE names.
-fn grid(fits: &mut Fits, hdu: usize) -> Result<Option<Healpix>, Error> {
+fn grid(fits: &mut FitsReader, hdu: usize) -> Result<Option<Healpix>, Error> {
     let Some(nside) = whole(fits, hdu, "NSIDE")? else { return Ok(None) };
     let grid = usize::try_from(nside).ok().and_then(|nside| Healpix::new(nside).ok());
     grid.map(Some).ok_or_else(|| bad_key(hdu, "NSIDE", nside, "between 1 and 2^29"))
 }
 
-fn bad_key(hdu: usize, key: &str, value: impl ToString, expected: &'static str) -> Error {
+pub(super) fn bad_key(hdu: usize, key: &str, value: impl ToString, expected: &'static str) -> Error {
     Error::Keyword { hdu, key: key.to_owned(), value: value.to_string(), expected }
 }
 
 /// A keyword's text, `None` where it is absent or blank. A number is the text of its digits.
-pub(super) fn text(fits: &mut Fits, key: &str) -> Result<Option<String>, Error> {
+pub(super) fn text(fits: &mut FitsReader, key: &str) -> Result<Option<String>, Error> {
     Ok(fits.key(key)?.and_then(|raw| {
         let text = raw
             .strip_prefix('\'')
@@ -357,12 +378,12 @@ pub(super) fn text(fits: &mut Fits, key: &str) -> Result<Option<String>, Error> 
 }
 
 /// A keyword's number, `None` where it is absent or no number. Some files write numbers as text.
-pub(super) fn number(fits: &mut Fits, key: &str) -> Result<Option<f64>, Error> {
+pub(super) fn number(fits: &mut FitsReader, key: &str) -> Result<Option<f64>, Error> {
     Ok(text(fits, key)?.and_then(|text| text.replace(['D', 'd'], "E").parse().ok()))
 }
 
 /// A keyword's whole number, `None` where it is absent.
-pub(super) fn whole(fits: &mut Fits, hdu: usize, key: &str) -> Result<Option<i64>, Error> {
+pub(super) fn whole(fits: &mut FitsReader, hdu: usize, key: &str) -> Result<Option<i64>, Error> {
     let Some(text) = text(fits, key)? else { return Ok(None) };
     if let Ok(value) = text.parse() {
         return Ok(Some(value));

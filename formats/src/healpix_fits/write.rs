@@ -11,7 +11,7 @@ use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
 use super::read::CHUNK;
-use crate::cfitsio::Fits;
+use crate::cfitsio::FitsWriter;
 use crate::{CoordinateSystem, Error, Healpix, Ordering, UNSEEN, save};
 
 /// One entry of a header.
@@ -135,7 +135,7 @@ impl HealpixFile {
     }
 
     fn write(&self, path: &Path) -> Result<(), Error> {
-        let mut fits = Fits::create(path)?;
+        let mut fits = FitsWriter::create(path)?;
         fits.write_primary()?;
         for extension in &self.extensions {
             self.write_header(&mut fits, extension)?;
@@ -151,7 +151,7 @@ impl HealpixFile {
         if self.grid.pixels().is_multiple_of(ROW) { ROW } else { 1 }
     }
 
-    fn write_header(&self, fits: &mut Fits, extension: &Extension) -> Result<(), Error> {
+    fn write_header(&self, fits: &mut FitsWriter, extension: &Extension) -> Result<(), Error> {
         let form = format!("{}{}", self.repeat(), if self.float32 { 'E' } else { 'D' });
         let texts = extension.columns.iter().map(|c| Ok((name(&c.name)?, name(&c.unit)?)));
         let texts: Vec<_> = texts.collect::<Result<_, Error>>()?;
@@ -190,7 +190,7 @@ impl HealpixFile {
         Ok(())
     }
 
-    fn write_column(&self, fits: &mut Fits, number: std::ffi::c_int, values: &[f64]) -> Result<(), Error> {
+    fn write_column(&self, fits: &mut FitsWriter, number: std::ffi::c_int, values: &[f64]) -> Result<(), Error> {
         let layer = match self.ordering {
             Ordering::Ring => None,
             Ordering::Nested => Some(cdshealpix::nested::get(self.grid.depth()?)),

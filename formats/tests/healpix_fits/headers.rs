@@ -179,6 +179,15 @@ fn absurd_sizes_are_errors_and_allocate_nothing() {
             let _ = describe(&scratch(&bytes).path).map_err(|e| problem::<()>(Err(e)));
         }
     }
+    // What cfitsio would go on with, uninitialised or without bound.
+    for (key, value) in [("TFIELDS", "1000"), ("TFIELDS", "-1"), ("NAXIS1", "-8"), ("NAXIS2", "-3"), ("NAXIS2", "T")] {
+        let (error, told) = problem_with(&with_keys(&[(key, value), ("NSIDE", "2")]), &Selection::default());
+        assert!(matches!(&error, Error::Keyword { key: k, .. } if k == key), "{told}");
+    }
+    // A column of 2^64 bytes, to cfitsio the same as none.
+    let columns = [col("T", "16D", f64s(&ring_values())), col("X", "2305843009213693952D", vec![])];
+    let (error, told) = problem_with(&file(3, &columns, &[("NSIDE", "2")]), &field("X"));
+    assert!(matches!(&error, Error::Keyword { key, .. } if key == "TFORM2"), "{told}");
     // A table larger than the file, and one whose size overflows to a small number.
     for (width, rows) in [("128", "4000"), ("4294967296", "4294967296")] {
         let (error, told) =
@@ -228,7 +237,7 @@ fn headers_without_an_end() {
             chunk[..3].copy_from_slice(b"XXX");
         }
     }
-    assert!(matches!(problem_with(&endless, &Selection::default()).0, Error::Cfitsio { .. }));
+    assert!(matches!(problem_with(&endless, &Selection::default()).0, Error::CutShort { .. }));
     let primary = header(&[("SIMPLE", "T".to_owned())]);
     drop(problem_with(&primary, &Selection::default()));
 }
