@@ -137,8 +137,8 @@ impl CellRing {
         let mut geometry = Geometry { count: stencil.count, ..Geometry::default() };
         for (c, corner) in stencil.corners.iter().enumerate() {
             let ring = self.grid.ring(corner.ring);
-            let (sin_phi, cos_phi) = if self.sectors == 1 && self.ring % (4 * self.grid.nside()) == 0 {
-                // The pole's cell: its corners are the quarter turns of one another, to the last bit.
+            let (sin_phi, cos_phi) = if self.sectors == 1 {
+                // A pole's cell: its corners are the quarter turns of one another, to the last bit.
                 let half = std::f64::consts::FRAC_1_SQRT_2;
                 [(half, half), (half, -half), (-half, -half), (-half, half)][corner.column]
             } else {
@@ -200,11 +200,11 @@ impl Geometry {
     /// from the next.
     #[inline(always)]
     pub(crate) fn point(&self, edge: usize, from_end: bool, fraction: f64) -> Point {
-        let corner = if from_end { self.next(edge) } else { edge };
-        let (at, along) = (self.corner[corner], self.along[edge][usize::from(from_end)]);
+        let corner = self.corner[if from_end { self.next(edge) } else { edge }];
+        let along = self.along[edge][usize::from(from_end)];
         let (sin, versine) = angles::sin_versine(fraction * self.arc[edge]);
-        let offset = along * if from_end { -sin } else { sin } - at * versine;
-        Point { at: at + offset, corner, offset }
+        let offset = along * if from_end { -sin } else { sin } - corner * versine;
+        Point { at: corner + offset, corner, offset }
     }
 
     /// The corner after this one, which is also the end of this edge.
@@ -237,7 +237,7 @@ pub fn area_of_triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
 pub(crate) struct Point {
     /// The unit vector.
     pub(crate) at: DVec3,
-    corner: usize,
+    corner: DVec3,
     /// From the corner to the point: what remains exact when the two nearly coincide.
     offset: DVec3,
 }
@@ -246,7 +246,7 @@ impl Point {
     /// The vector from another point of the cell to this one, without cancellation where both are near one corner.
     #[inline(always)]
     pub(crate) fn minus(&self, other: &Point) -> DVec3 {
-        if self.corner == other.corner { self.offset - other.offset } else { self.at - other.at }
+        (self.corner - other.corner) + (self.offset - other.offset)
     }
 }
 

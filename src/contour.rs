@@ -226,18 +226,17 @@ fn cut(
     let crossing = |edge: usize| {
         // Halves, so that differences of the largest numbers stay finite.
         let (a, b, t) = (0.5 * values[edge], 0.5 * values[next(edge)], 0.5 * threshold);
-        let from_start = (t - a) / (b - a);
-        let from_end = from_start > 0.5;
-        let fraction = if from_end { (t - b) / (a - b) } else { from_start };
+        let from_end = (b - t).abs() < (t - a).abs();
+        let fraction = (if from_end { b - t } else { t - a }) / (b - a);
         Crossing { edge, point: geometry.point(edge, from_end, fraction.max(CROSSING_MARGIN)) }
     };
     let saddle = cell.count == 4 && above[0] == above[2] && above[1] == above[3];
     if !saddle {
-        let leaving = (0..cell.count).find(|&e| above[e] && !above[next(e)]).expect("the contour crosses this cell");
-        let mut returning = next(leaving);
-        while !above[next(returning)] {
-            returning = next(returning);
-        }
+        // Edges at which a walk around the cell leaves the part above and returns to it.
+        let mask = above[..cell.count].iter().rev().fold(0u32, |mask, &above| mask << 1 | u32::from(above));
+        let of_next = mask >> 1 | (mask & 1) << (cell.count - 1);
+        let leaving = (mask & !of_next).trailing_zeros() as usize;
+        let returning = (!mask & of_next).trailing_zeros() as usize;
         let (from, to) = (crossing(leaving), crossing(returning));
         sink.contour(cell, t, &[Segment::new(geometry, from, to, field.body)]);
         if sink.wants_area() {

@@ -24,8 +24,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The way of a field: [`formats`](longan_formats) → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
-//! pixels, by [`transport`] → moments of [`window`]s, or [`totals`] → [`measures`](longan_measures) → output.
+//! The way of a field: [`formats`] → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
+//! pixels, by [`transport`] → moments of [`window`]s, or [`totals`] → [`measures`] → output.
 //! [`Analysis`] brings these together. No module here prints or knows a path.
 //!
 //! Angles are in degrees in [`Analysis`], [`simulate`] and the measures, in radians below; lengths and areas on the

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use crate::cells::Pixel;
 use crate::contour::{Cell, Field, Segment, Sink, march};
 use crate::transport::Powers;
 
@@ -139,26 +140,15 @@ struct Gather<'a> {
 }
 
 impl Gather<'_> {
-    /// The moments of a ring, if it is one of those asked for.
+    /// Where to add what a cell gives to one of its corners, and that ring's length; nowhere for other rings.
     #[inline(always)]
-    fn ring(&mut self, ring: usize) -> Option<&mut RingMoments> {
-        ring.checked_sub(self.first).and_then(|i| self.rings.get_mut(i))
-    }
-
-    /// Adds one share for each corner to a row.
-    #[inline(always)]
-    fn share(&mut self, cell: Cell<'_>, row: usize, share: impl Fn(usize) -> f64) {
-        for (c, pixel) in cell.pixels[..cell.count].iter().enumerate() {
-            if let Some(ring) = self.ring(pixel.ring) {
-                let at = row * ring.len + pixel.column;
-                if pixel.ring == cell.ring {
-                    let len = ring.data.len();
-                    self.same_ring.resize(len, 0.0);
-                    self.same_ring[at] += share(c);
-                } else {
-                    ring.data[at] += share(c);
-                }
-            }
+    fn target(&mut self, cell: Cell<'_>, pixel: Pixel) -> Option<(&mut [f64], usize)> {
+        let ring = pixel.ring.checked_sub(self.first).and_then(|i| self.rings.get_mut(i))?;
+        if pixel.ring == cell.ring {
+            self.same_ring.resize(ring.data.len(), 0.0);
+            Some((&mut self.same_ring, ring.len))
+        } else {
+            Some((&mut ring.data, ring.len))
         }
     }
 
@@ -169,18 +159,18 @@ impl Gather<'_> {
         let by_turn = layout.weight == Weight::Curvature && !layout.ranks.is_empty();
         let length = if layout.length.is_some() || by_length { segment.length() } else { 0.0 };
         let turn = if layout.curvature.is_some() || by_turn { segment.turn() } else { 0.0 };
-        if let Some(row) = layout.length {
-            self.cell[row].iter_mut().for_each(|a| *a += length);
-        }
-        if let Some(row) = layout.curvature {
-            self.cell[row].iter_mut().for_each(|a| *a += turn);
+        let cell = &mut self.cell;
+        for (row, value) in [(layout.length, length), (layout.curvature, turn)] {
+            if let Some(row) = row {
+                cell[row] = cell[row].map(|a| a + value);
+            }
         }
         if layout.ranks.is_empty() {
             return;
         }
         let weight = if by_length { length } else { turn };
         let mut powers = Powers::new(segment.directions());
-        for (rows, &rank) in self.cell[layout.first_rank..].chunks_exact_mut(2).zip(&layout.ranks) {
+        for (rows, &rank) in cell[layout.first_rank..].chunks_exact_mut(2).zip(&layout.ranks) {
             let power = powers.raise(rank);
             for c in 0..4 {
                 rows[0][c] += weight * power.re[c];
@@ -196,8 +186,11 @@ impl Sink for Gather<'_> {
     }
 
     fn masked(&mut self, cell: Cell<'_>, _: f64) {
-        if let Some(row) = self.layout.masked {
-            self.share(cell, row, |_| 1.0);
+        let Some(row) = self.layout.masked else { return };
+        for &pixel in &cell.pixels[..cell.count] {
+            if let Some((data, len)) = self.target(cell, pixel) {
+                data[row * len + pixel.column] += 1.0;
+            }
         }
     }
 
@@ -213,7 +206,12 @@ impl Sink for Gather<'_> {
 
     #[inline(always)]
     fn contour(&mut self, _: Cell<'_>, _: usize, segments: &[Segment<'_>]) {
-        let [one, other] = segments else { return segments.iter().for_each(|s| self.add(s)) };
+        let [one, other] = segments else {
+            for segment in segments {
+                self.add(segment);
+            }
+            return;
+        };
         // The two of a saddle are summed first: their order depends on how the cell is turned.
         let so_far = std::mem::replace(&mut self.cell, vec![[0.0; 4]; self.layout.rows]);
         self.add(one);
@@ -226,15 +224,21 @@ impl Sink for Gather<'_> {
     #[inline(always)]
     fn cell_finished(&mut self, cell: Cell<'_>) {
         let part = 1.0 / cell.count as f64;
-        for row in 0..self.cell.len() {
-            let shares = std::mem::take(&mut self.cell[row]);
-            self.share(cell, row, |c| shares[c] * part);
+        let moments = std::mem::take(&mut self.cell);
+        for (c, &pixel) in cell.pixels[..cell.count].iter().enumerate() {
+            if let Some((data, len)) = self.target(cell, pixel) {
+                for (row, moments) in moments.iter().enumerate() {
+                    data[row * len + pixel.column] += moments[c] * part;
+                }
+            }
         }
+        self.cell = moments;
+        self.cell.fill([0.0; 4]);
     }
 
     fn ring_finished(&mut self, ring: usize) {
         let same_ring = std::mem::take(&mut self.same_ring);
-        if let Some(ring) = self.ring(ring) {
+        if let Some(ring) = ring.checked_sub(self.first).and_then(|i| self.rings.get_mut(i)) {
             ring.data.iter_mut().zip(&same_ring).for_each(|(a, b)| *a += b);
         }
         self.same_ring = same_ring;

@@ -249,7 +249,7 @@ proptest! {
     ) {
         let mut values = values(depth, kind, seed);
         if holes > 1 {
-            values.iter_mut().enumerate().filter(|(p, _)| (p * 7 + seed as usize) % (2 * holes) == 0).for_each(|(_, v)| *v = f64::NAN);
+            values.iter_mut().enumerate().filter(|(p, _)| (p * 7 + seed as usize).is_multiple_of(2 * holes)).for_each(|(_, v)| *v = f64::NAN);
         }
         let top = values.iter().copied().fold(1.0, f64::max);
         // Whole numbers among them, which are values of the map.
