@@ -10,8 +10,9 @@ export PKG_CONFIG_PATH := $(if $(PKG_CONFIG_PATH),$(PKG_CONFIG_PATH):)$(CONDA_PR
 export RUSTFLAGS += $(shell [ ! -e '$(CONDA_PREFIX)/lib/pkgconfig/cfitsio.pc' ] || echo '-Clink-arg=-Wl,-rpath,$(CONDA_PREFIX)/lib')
 endif
 
-# The folder that `make demo` writes, and flags for every cargo command that resolves packages, such as --locked.
+# The folder that `make demo` writes, what `make bench` measures, and flags for every cargo command that resolves packages, such as --locked.
 DEMO = demo
+NSIDE = 512
 CARGOFLAGS =
 
 .PHONY: help demo test check licences bench install clean setup
@@ -43,8 +44,9 @@ licences: ## check that no dependency forces a GPL licence on longan
 		NF && (!free || $$1 ~ /GPL.* AND | AND .*GPL/) { print "licence refused: " $$2 " has \"" $$1 "\""; bad = 1 } \
 		END { exit bad }'
 
-bench: setup ## compare longan's speed with that of its peers
-	cargo bench --bench peers $(CARGOFLAGS)
+bench: setup ## compare longan's speed with that of its peers (NSIDE=512)
+	cargo build --release $(CARGOFLAGS)
+	python=$$(tools/setup python) && "$${python:-python3}" benches/peers.py $(NSIDE)
 
 install: setup ## install longan with cargo
 	cargo install --path . --locked

@@ -13,8 +13,8 @@ pub(crate) fn sin_versine(x: f64) -> (f64, f64) {
         return (x.sin(), 2.0 * (x / 2.0).sin().powi(2));
     }
     let xx = x * x;
-    let sin = x * (1.0 - xx / 6.0 * (1.0 - xx / 20.0 * (1.0 - xx / 42.0)));
-    let versine = xx / 2.0 * (1.0 - xx / 12.0 * (1.0 - xx / 30.0 * (1.0 - xx / 56.0)));
+    let sin = x - x * xx * (1.0 / 6.0 - xx * (1.0 / 120.0 - xx * (1.0 / 5040.0)));
+    let versine = xx * (0.5 - xx * (1.0 / 24.0 - xx * (1.0 / 720.0 - xx * (1.0 / 40320.0))));
     (sin, versine)
 }
 

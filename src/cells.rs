@@ -12,7 +12,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use longan_formats::Healpix;
+use longan_formats::{Healpix, Ring};
 
 use crate::angles;
 
@@ -66,14 +66,28 @@ impl Stencil {
     }
 }
 
+/// A pixel ring near a cell ring.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    number: usize,
+    ring: Ring,
+    per_sector: usize,
+}
+
+const NORTH: usize = 0;
+const SAME: usize = 1;
+const SOUTH: usize = 2;
+
 /// The cells of one ring: `stencils` different ones, each repeated in `sectors` sectors.
 ///
 /// Ring 0 is the north pole's cell, ring 4 Nside the south pole's; ring i between them holds the cells east of
 /// the pixels of ring i, in their order.
 #[derive(Clone, Copy, Debug)]
 pub struct CellRing {
-    grid: Healpix,
+    nside: usize,
     ring: usize,
+    /// The pixel rings to the north, of the same number, and to the south; a pole's cell has its only one three times.
+    near: [Near; 3],
     /// Number of different cells in a sector.
     pub stencils: usize,
     /// Number of sectors.
@@ -92,27 +106,31 @@ impl CellRing {
             i if i <= n => (i, 4),
             _ => (1, 4 * n),
         };
-        CellRing { grid, ring, stencils, sectors, uniform: stencils == 1 }
+        let near = [ring.saturating_sub(1), ring, ring + 1].map(|i| {
+            let number = i.clamp(1, grid.rings());
+            let ring = grid.ring(number);
+            Near { number, ring, per_sector: ring.len / sectors }
+        });
+        CellRing { nside: n, ring, near, stencils, sectors, uniform: stencils == 1 }
     }
 
     /// The `k`-th stencil of the ring, `0..self.stencils`.
     pub fn stencil(&self, k: usize) -> Stencil {
-        let (n, i) = (self.grid.nside(), self.ring);
-        let corner = |ring: usize, column: usize| {
-            let r = self.grid.ring(ring);
-            Corner { ring, column, per_sector: r.len / self.sectors, len: r.len, start: r.start }
+        let (n, i) = (self.nside, self.ring);
+        let corner = |side: usize, column: usize| {
+            let Near { number, ring, per_sector } = self.near[side];
+            Corner { ring: number, column, per_sector, len: ring.len, start: ring.start }
         };
         if i == 0 || i == 4 * n {
-            let ring = if i == 0 { 1 } else { 4 * n - 1 };
-            let column = |c: usize| if i == 0 { c } else { 3 - c };
-            return Stencil { corners: [0, 1, 2, 3].map(|c| corner(ring, column(c))), count: 4, meridian: 0.0 };
+            let columns = if i == 0 { [0, 1, 2, 3] } else { [3, 2, 1, 0] };
+            return Stencil { corners: columns.map(|c| corner(SAME, c)), count: 4, meridian: 0.0 };
         }
-        let (west, east) = (corner(i, k), corner(i, k + 1));
-        let north = |column| corner(i - 1, column);
-        let south = |column| corner(i + 1, column);
+        let (west, east) = (corner(SAME, k), corner(SAME, k + 1));
+        let north = |column| corner(NORTH, column);
+        let south = |column| corner(SOUTH, column);
         let last = k + 1 == self.stencils;
         let (corners, count) = if i > n && i < 3 * n {
-            let column = usize::from(self.grid.ring(i).shifted);
+            let column = usize::from(self.near[SAME].ring.shifted);
             ([west, south(column), east, north(column)], 4)
         } else if i < n && last {
             ([west, south(k + 1), south(k + 2), east], 4)
@@ -127,7 +145,7 @@ impl CellRing {
         } else {
             ([west, south(k), east, north(k + 1)], 4)
         };
-        let ring = self.grid.ring(i);
+        let ring = self.near[SAME].ring;
         let meridian = (2 * k + 1 + usize::from(ring.shifted)) as f64 * (PI / ring.len as f64);
         Stencil { corners, count, meridian }
     }
@@ -136,7 +154,7 @@ impl CellRing {
     pub fn geometry(&self, stencil: &Stencil) -> Geometry {
         let mut geometry = Geometry { count: stencil.count, ..Geometry::default() };
         for (c, corner) in stencil.corners.iter().enumerate() {
-            let ring = self.grid.ring(corner.ring);
+            let ring = self.near[corner.ring + SAME - self.near[SAME].number].ring;
             let (sin_phi, cos_phi) = if self.sectors == 1 {
                 // A pole's cell: its corners are the quarter turns of one another, to the last bit.
                 let half = std::f64::consts::FRAC_1_SQRT_2;
@@ -162,7 +180,7 @@ impl CellRing {
             let chord_sq = (b - a).length_squared();
             let cos_arc = 1.0 - chord_sq / 2.0;
             let sin_arc = (chord_sq * (1.0 - chord_sq / 4.0)).sqrt();
-            geometry.arc[c] = 2.0 * (chord_sq.sqrt() / 2.0).asin();
+            geometry.arc[c] = angles::from_sin_cos(sin_arc, cos_arc);
             geometry.along[c] = [(b - a * cos_arc) * (1.0 / sin_arc), (b * cos_arc - a) * (1.0 / sin_arc)];
         }
         geometry

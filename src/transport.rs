@@ -108,6 +108,10 @@ impl<const N: usize> Powers<N> {
     pub fn raise(&mut self, rank: u32) -> &Phases<N> {
         let mut missing = rank - self.rank;
         self.rank = rank;
+        if missing == 1 {
+            self.power.multiply(&self.base);
+            return &self.power;
+        }
         let mut square = self.base;
         while missing > 0 {
             if missing & 1 == 1 {

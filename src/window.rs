@@ -21,6 +21,9 @@ const BAND: usize = 128;
 /// Pixels transported at a time.
 const BLOCK: usize = 32;
 
+/// Numbers summed side by side, as many as the widest vector units hold.
+const LANES: usize = 8;
+
 /// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]
 pub struct Moments {
@@ -71,12 +74,11 @@ pub fn windows(
         }
         next += 1;
         band.advance(field, &layout, reach);
-        let quadrants: Vec<Vec<f64>> = (4 * first..4 * next)
+        let rings: Vec<OutputRing> =
+            (first..next).into_par_iter().map(|i| OutputRing::new(input, output, i, radius)).collect();
+        let quadrants: Vec<Vec<f64>> = (0..4 * rings.len())
             .into_par_iter()
-            .map(|i| {
-                let ring = OutputRing::new(input, output, i / 4, radius);
-                ring.quadrant(i % 4, &band, &layout, field.thresholds(), columns, &visit)
-            })
+            .map(|i| rings[i / 4].quadrant(i % 4, &band, &layout, field.thresholds(), columns, &visit))
             .collect();
         for quadrant in &quadrants {
             for (column, out) in out.iter_mut().enumerate() {
@@ -161,7 +163,7 @@ struct Reached {
     half_width: f64,
     transport: RingTransport,
     /// cos and sin of k pixels' longitude, k < BLOCK.
-    steps: [Complex64; BLOCK],
+    steps: Phases<BLOCK>,
     /// The same for BLOCK pixels.
     stride: Complex64,
 }
@@ -178,15 +180,19 @@ impl OutputRing {
                 return None;
             }
             let half_width = if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI };
-            let step = TAU / r.len as f64;
+            let step = Complex64::cis(TAU / r.len as f64);
+            let mut steps = [Complex64::ONE; BLOCK];
+            (1..BLOCK).for_each(|k| steps[k] = if k == 1 { step } else { steps[k / 2] * steps[k - k / 2] });
+            let stride = steps[BLOCK / 2] * steps[BLOCK / 2];
+            let steps = Phases { re: steps.map(|s| s.re), im: steps.map(|s| s.im) };
             Some(Reached {
                 ring: i,
                 len: r.len,
                 shift: usize::from(r.shifted),
                 half_width,
                 transport: RingTransport::new((r.sin_theta, r.cos_theta), (centre.sin_theta, centre.cos_theta)),
-                steps: std::array::from_fn(|k| Complex64::cis(k as f64 * step)),
-                stride: Complex64::cis(BLOCK as f64 * step),
+                steps,
+                stride,
             })
         });
         let single = radius == 0.0;
@@ -206,36 +212,38 @@ impl OutputRing {
     ) -> Vec<f64> {
         let ring = self.output.ring(self.ring);
         let in_quadrant = ring.len / 4;
-        let mut out = vec![0.0; in_quadrant * columns];
-        let mut sums = vec![0.0; layout.rows];
-        let mut moments = Moments::default();
-        for (k, out) in out.chunks_exact_mut(columns).enumerate() {
-            sums.fill(0.0);
-            let mut pixels = 0;
-            let phi = ring.phi(k as isize);
-            let column = quadrant * in_quadrant + k;
-            if self.single {
-                pixels += 1;
-                for (row, sum) in sums.iter_mut().enumerate() {
-                    *sum = band.ring(self.ring).row(row)[column];
-                }
+        let first = quadrant * in_quadrant;
+        let mut sums = vec![vec![0.0; layout.rows]; in_quadrant];
+        let mut pixels = vec![0; in_quadrant];
+        if self.single {
+            let moments = band.ring(self.ring);
+            for (k, sums) in sums.iter_mut().enumerate() {
+                pixels[k] = 1;
+                (0..layout.rows).for_each(|row| sums[row] = moments.row(row)[first + k]);
             }
-            for reached in &self.reached {
-                let moments = band.ring(reached.ring);
-                let (columns, dphi) = reached.columns(phi, quadrant);
-                pixels += columns.len();
+        }
+        // Input ring by input ring, so that what neighbouring windows share is read once.
+        for reached in &self.reached {
+            let moments = band.ring(reached.ring);
+            for (k, sums) in sums.iter_mut().enumerate() {
+                let (columns, dphi) = reached.columns(ring.phi(k as isize), quadrant);
+                pixels[k] += columns.len();
                 if columns.end <= reached.len {
-                    add(moments, layout, columns, dphi, reached, &mut sums);
+                    add(moments, layout, columns, dphi, reached, sums);
                 } else {
                     // Across φ = 0: put together first, so that the sum is the same wherever the window lies.
                     let joined = moments.joined(columns.start..reached.len, 0..columns.end - reached.len);
-                    add(&joined, layout, 0..columns.len(), dphi, reached, &mut sums);
+                    add(&joined, layout, 0..columns.len(), dphi, reached, sums);
                 }
             }
-            moments.centre = (ring.theta(), ring.phi(column as isize));
-            moments.masked_fraction = match (pixels, layout.masked) {
+        }
+        let mut out = vec![0.0; in_quadrant * columns];
+        let mut moments = Moments::default();
+        for ((k, out), mut sums) in out.chunks_exact_mut(columns).enumerate().zip(sums) {
+            moments.centre = (ring.theta(), ring.phi((first + k) as isize));
+            moments.masked_fraction = match (pixels[k], layout.masked) {
                 (0, _) => 1.0,
-                (_, Some(row)) => sums[row] / (SHARES * pixels) as f64,
+                (_, Some(row)) => sums[row] / (SHARES * pixels[k]) as f64,
                 (_, None) => 0.0,
             };
             sums.iter_mut().for_each(|sum| *sum /= thresholds as f64);
@@ -273,7 +281,7 @@ impl Reached {
 #[multiversion::multiversion(targets = "simd")]
 fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, dphi: f64, reached: &Reached, sums: &mut [f64]) {
     for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
-        *sum += ring.row(row)[columns.clone()].iter().sum::<f64>();
+        *sum += sum_of(&ring.row(row)[columns.clone()]);
     }
     if layout.ranks.is_empty() {
         return;
@@ -282,24 +290,55 @@ fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, dphi: f64, re
     for start in columns.clone().step_by(BLOCK) {
         let mut phases = Phases::<BLOCK>::default();
         for k in 0..BLOCK {
-            let dphi = base * reached.steps[k];
-            let phase = reached.transport.phase(dphi.re, dphi.im);
+            let (step_re, step_im) = (reached.steps.re[k], reached.steps.im[k]);
+            let (cos, sin) = (base.re * step_re - base.im * step_im, base.re * step_im + base.im * step_re);
+            let phase = reached.transport.phase(cos, sin);
             (phases.re[k], phases.im[k]) = (phase.re, phase.im);
         }
         base *= reached.stride;
-        let end = (start + BLOCK).min(columns.end);
+        let block = start..(start + BLOCK).min(columns.end);
         let mut powers = Powers::new(phases);
         for (i, &rank) in layout.ranks.iter().enumerate() {
             let row = layout.first_rank + 2 * i;
-            let (re, im) = (&ring.row(row)[start..end], &ring.row(row + 1)[start..end]);
-            let power = powers.raise(rank);
-            let (mut sum_re, mut sum_im) = (0.0, 0.0);
-            for (((re, im), u), v) in re.iter().zip(im).zip(&power.re).zip(&power.im) {
-                sum_re += re * u - im * v;
-                sum_im += re * v + im * u;
-            }
-            sums[row] += sum_re;
-            sums[row + 1] += sum_im;
+            let (re, im) = (&ring.row(row)[block.clone()], &ring.row(row + 1)[block.clone()]);
+            let sum = sum_of_turned(re, im, powers.raise(rank));
+            sums[row] += sum.re;
+            sums[row + 1] += sum.im;
         }
     }
+}
+
+/// Sum of the values, in lanes side by side.
+#[inline(always)]
+fn sum_of(values: &[f64]) -> f64 {
+    let mut lanes = [0.0; LANES];
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    for chunk in chunks {
+        (0..LANES).for_each(|k| lanes[k] += chunk[k]);
+    }
+    (0..rest.len()).for_each(|k| lanes[k] += rest[k]);
+    lanes.iter().sum()
+}
+
+/// Sum of the complex numbers re + i im, each turned by its phase.
+#[inline(always)]
+fn sum_of_turned(re: &[f64], im: &[f64], by: &Phases<BLOCK>) -> Complex64 {
+    let (mut lanes_re, mut lanes_im) = ([0.0; LANES], [0.0; LANES]);
+    let mut add = |lane: usize, re: f64, im: f64, u: f64, v: f64| {
+        lanes_re[lane] += re * u - im * v;
+        lanes_im[lane] += re * v + im * u;
+    };
+    let (re_chunks, re_rest) = re.as_chunks::<LANES>();
+    let (im_chunks, im_rest) = im.as_chunks::<LANES>();
+    let (u_chunks, v_chunks) = (by.re.as_chunks::<LANES>().0, by.im.as_chunks::<LANES>().0);
+    for (((re, im), u), v) in re_chunks.iter().zip(im_chunks).zip(u_chunks).zip(v_chunks) {
+        for k in 0..LANES {
+            add(k, re[k], im[k], u[k], v[k]);
+        }
+    }
+    let done = re.len() - re_rest.len();
+    for k in 0..re_rest.len() {
+        add(k, re_rest[k], im_rest[k], by.re[done + k], by.im[done + k]);
+    }
+    Complex64::new(lanes_re.iter().sum(), lanes_im.iter().sum())
 }

@@ -92,10 +92,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let evq_values = maps.values[0].clone();
     write("waves_evq.fits", &arguments.file(maps, &field, "waves.fits", &analysis, &evq))?;
-    let top = Options { title: "Gaussian field".to_owned(), label: "value in σ".to_owned(), ..Options::default() };
+    let top = Options {
+        title: "Gaussian field".to_owned(),
+        label: "value in σ".to_owned(),
+        width: 1000,
+        ..Options::default()
+    };
     let bottom = Options {
         title: "Its Minkowski map: EVQ in windows of 6°".to_owned(),
         label: "eigenvalue quotient".to_owned(),
+        width: 1000,
         ..Options::default()
     };
     let both = [Panel { values: field.values(), options: top }, Panel { values: &evq_values, options: bottom }];
