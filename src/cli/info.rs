@@ -82,14 +82,15 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
             };
             let of_map = map.as_ref().and_then(|map| statistics(map.values()));
             let number = |f: fn(&Statistics) -> f64| of_map.as_ref().map(f);
-            let unmasked = of_map.map_or(0, |s| s.unmasked) as f64;
+            let unmasked = of_map.map_or(0, |s| s.unmasked);
+            let masked = |pixels: usize| (pixels - unmasked) as f64 / pixels as f64;
             fields.push(FieldReport {
                 field,
                 min: number(|s| s.min),
                 max: number(|s| s.max),
                 mean: number(|s| s.mean),
                 standard_deviation: number(|s| s.sigma),
-                masked_fraction: map.map(|map| 1.0 - unmasked / map.values().len() as f64),
+                masked_fraction: map.map(|map| masked(map.values().len())),
                 not_a_map,
             });
         }
