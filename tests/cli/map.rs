@@ -327,3 +327,29 @@ fn multi_order_maps_are_brought_to_the_nside_asked_for() {
     let header = &folder.headers("coarse.fits")[0];
     assert_eq!([&header["INNSIDE"], &header["NSIDE"], &header["ORDERING"]], ["8", "8", "RING"]);
 }
+
+#[test]
+fn windows_may_be_smaller_than_pixels() {
+    let folder = Folder::new();
+    for nside in [1, 2, 3, 8] {
+        folder.done(&format!("simulate shapes -o sky.fits --edge smooth --nside {nside} --overwrite"));
+        for (nside_out, window) in [(16, 0.5), (5, 3.0), (2, 0.001)] {
+            let words = format!("map sky.fits -o out.fits --overwrite --nside-out {nside_out} --window {window}");
+            folder.done(&format!("{words} --thresholds -40,0 --measure w0,masked-fraction"));
+            let w0 = folder.read("out.fits", "W0");
+            // A window has an area exactly if it holds the centre of a pixel.
+            let sky = folder.read("sky.fits", "0");
+            for (pixel, &area) in w0.values().iter().enumerate() {
+                let (theta, phi) = w0.grid().centre(pixel);
+                let near = (0..sky.values().len()).map(|other| {
+                    let (t, p) = sky.grid().centre(other);
+                    let cos = theta.cos() * t.cos() + theta.sin() * t.sin() * (phi - p).cos();
+                    cos.clamp(-1.0, 1.0).acos().to_degrees()
+                });
+                let nearest = near.fold(f64::INFINITY, f64::min);
+                let clear = (nearest - window).abs() > 1e-4;
+                assert!(!clear || area.is_nan() == (nearest > window), "{words}: pixel {pixel}, {nearest} deg: {area}");
+            }
+        }
+    }
+}
