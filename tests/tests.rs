@@ -1,5 +1,9 @@
 //! Tests of longan as a whole, one module a theme.
 
+/// The program, run as users run it.
+mod cli;
+/// Files exchanged with healpy.
+mod healpy;
 /// What holds for any map: Gauss–Bonnet, symmetry, duality, additivity, threads.
 mod invariants;
 /// A slow, obvious implementation judges the fast one.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use anyhow::Context;
 use clap::Args;
 use longan::formats::{self, HealpixFile, Ordering};
 use longan::measures::{BuiltIn, find};
@@ -10,7 +11,7 @@ use longan::picture::{Options, Panel, panels};
 use longan::simulate::{Edge, Waves, scene, shapes};
 use longan::{Analysis, Healpix, Map, MinkowskiMaps, ThresholdUnit};
 
-use super::options::{Input, Running};
+use super::options::{Input, Running, shown};
 use super::output::Provenance;
 use super::simulate::{file, waves_cards};
 
@@ -37,18 +38,13 @@ const FIELD: (f64, u64) = (2.0, 1);
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let folder = &arguments.folder;
-    std::fs::create_dir_all(folder)
-        .map_err(|e| anyhow::anyhow!("{}: cannot make the folder: {e}", folder.display()))?;
+    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot make this folder", shown(folder)))?;
     let path = |name: &str| folder.join(name);
     for name in ["shapes.fits", "shapes_evq.fits", "waves.fits", "waves_evq.fits", "waves_evq.png"] {
         formats::check_writable(&path(name), arguments.overwrite)?;
     }
     let write = |name: &str, file: &HealpixFile| formats::write_healpix(&path(name), file, arguments.overwrite);
-    let say = |line: String| {
-        if !arguments.running.quiet {
-            println!("{line}");
-        }
-    };
+    let say = |line: String| arguments.running.say(line);
     let evq = [find("evq")?];
 
     let bodies = shapes(Healpix::new(NSIDE[0])?, &scene(), Edge::Binary);
@@ -60,13 +56,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ..Analysis::default()
     };
     let maps = analysis.minkowski_maps(&bodies, &evq, |_| ())?;
-    say(format!("Bodies of 4 to 6 degrees at Nside {}, EVQ in a window of 6 degrees about their middle:", NSIDE[0]));
+    say(format!("Bodies of 4 to 6 degrees at Nside {}, EVQ in a window of 6 degrees about their middle:", NSIDE[0]))?;
     for (name, longitude, sides) in [("square", -135.0, 1), ("2:1 rectangle", -90.0, 2), ("3:1 rectangle", -45.0, 3)] {
         let pixel = maps.grid.pixel_at(std::f64::consts::FRAC_PI_2, f64::to_radians(longitude));
-        say(format!("  {name:<14} {:.3}   (ratio of its sides: {sides})", maps.values[0][pixel]));
+        say(format!("  {name:<14} {:.3}   (ratio of its sides: {sides})", maps.values[0][pixel]))?;
     }
     let (_, totals, _) = analysis.totals(&bodies)?;
-    say(format!("  Euler characteristic {:.6}   (seven bodies, no holes)", totals[0].euler_characteristic()));
+    say(format!("  Euler characteristic {:.6}   (seven bodies, no holes)", totals[0].euler_characteristic()))?;
     write("shapes_evq.fits", &arguments.file(maps, &bodies, "shapes.fits", &analysis, &evq))?;
 
     let (correlation, seed) = FIELD;
@@ -78,17 +74,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let maps = analysis.minkowski_maps(&field, &evq, |_| ())?;
     let seconds = start.elapsed().as_secs_f64();
     let (thresholds, totals, _) = analysis.totals(&field)?;
-    say(format!("\nGaussian field of correlation angle {correlation} degrees at Nside {}:", NSIDE[1]));
-    say("  threshold   length [rad]   expected   Euler characteristic".to_owned());
+    say(format!("\nGaussian field of correlation angle {correlation} degrees at Nside {}:", NSIDE[1]))?;
+    say("  threshold   length [rad]   expected   Euler characteristic".to_owned())?;
     for (threshold, t) in thresholds.values().iter().zip(&totals).step_by(2) {
         // Length per area of a Gaussian field: (σ1/σ0)/(2√2) e^{−ν²/2}; the mean of the ensemble.
         let nu = threshold / waves.sigma0();
         let slope = waves.sigma1() / waves.sigma0();
         let expected = 4.0 * std::f64::consts::PI * slope / (2.0 * 2f64.sqrt()) * (-nu * nu / 2.0).exp();
         let euler = t.euler_characteristic();
-        say(format!("  {threshold:>9.4} {:>14.4} {expected:>10.4} {euler:>18.6}", t.length));
+        say(format!("  {threshold:>9.4} {:>14.4} {expected:>10.4} {euler:>18.6}", t.length))?;
     }
-    say(format!("  Minkowski map of Nside {NSIDE_OUT}: {seconds:.2} s"));
+    say(format!("  Minkowski map of Nside {NSIDE_OUT}: {seconds:.2} s"))?;
 
     let evq_values = maps.values[0].clone();
     write("waves_evq.fits", &arguments.file(maps, &field, "waves.fits", &analysis, &evq))?;
@@ -109,8 +105,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     formats::save(&path("waves_evq.png"), arguments.overwrite, |temporary| {
         std::fs::write(temporary, &png).map_err(|cause| formats::Error::Io { action: "write it", cause })
     })?;
-    say(format!("\nMaps and the picture waves_evq.png are in {}", folder.display()));
-    Ok(())
+    say(format!("\nMaps and the picture waves_evq.png are in {}", shown(folder)))
 }
 
 impl Arguments {

@@ -1,18 +1,23 @@
 //! `longan info`: what longan sees in a file.
 
-use std::io::Write;
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use longan::formats::{self, Description, Field, FieldDescription, Indexing, Selection, TableDescription};
+use longan::formats::{self, Description, Error, Field, FieldDescription, Indexing, Selection, TableDescription};
 use longan::statistics::{Statistics, statistics};
 use serde::Serialize;
+
+use super::options::{decimals, nside, print, shown};
 
 /// What a file holds: Nside, ordering, coordinate system, and each field's unit, range and masked fraction.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// HEALPix file.
     file: PathBuf,
+    /// For multi-order (UNIQ) files: Nside to bring the map to [default: that of its finest cells].
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
+    nside: Option<usize>,
     /// How to print.
     #[arg(long, value_name = "FORMAT", default_value = "text")]
     format: Format,
@@ -47,21 +52,21 @@ struct FieldReport<'a> {
     max: Option<f64>,
     mean: Option<f64>,
     standard_deviation: Option<f64>,
-    masked_fraction: f64,
+    masked_fraction: Option<f64>,
+    /// What it holds where that is no map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    not_a_map: Option<&'static str>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let description = formats::describe(&arguments.file)?;
     let report = report(arguments, &description)?;
-    let mut out = std::io::stdout().lock();
+    let mut out = String::new();
     match arguments.format {
-        Format::Json => {
-            serde_json::to_writer_pretty(&mut out, &report)?;
-            writeln!(out)?;
-        }
-        Format::Text => print(&mut out, arguments, &report)?,
+        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?,
+        Format::Text => write_text(&mut out, arguments, &report)?,
     }
-    Ok(())
+    print(&out)
 }
 
 fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Result<Report<'a>> {
@@ -69,17 +74,24 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
     for table in &description.tables {
         let mut fields = Vec::new();
         for (number, field) in table.fields.iter().enumerate() {
-            let selection = Selection { field: Some(Field::Number(number)), hdu: Some(table.hdu), nside: None };
-            let map = formats::read(&arguments.file, &selection)?;
-            let of_map = statistics(map.values());
+            let nside = arguments.nside.filter(|_| table.indexing == Indexing::MultiOrder);
+            let selection = Selection { field: Some(Field::Number(number)), hdu: Some(table.hdu), nside };
+            let (map, not_a_map) = match formats::read(&arguments.file, &selection) {
+                Ok(map) => (Some(map), None),
+                Err(e) => (None, Some(kind(e)?)),
+            };
+            let of_map = map.as_ref().and_then(|map| statistics(map.values()));
             let number = |f: fn(&Statistics) -> f64| of_map.as_ref().map(f);
+            let unmasked = of_map.map_or(0, |s| s.unmasked);
+            let masked = |pixels: usize| (pixels - unmasked) as f64 / pixels as f64;
             fields.push(FieldReport {
                 field,
                 min: number(|s| s.min),
                 max: number(|s| s.max),
                 mean: number(|s| s.mean),
                 standard_deviation: number(|s| s.sigma),
-                masked_fraction: 1.0 - of_map.map_or(0.0, |s| s.unmasked as f64 / map.values().len() as f64),
+                masked_fraction: map.map(|map| masked(map.values().len())),
+                not_a_map,
             });
         }
         tables.push(Table { table, fields });
@@ -87,8 +99,19 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
     Ok(Report { format: description.format, tables })
 }
 
-fn print(out: &mut impl Write, arguments: &Arguments, report: &Report<'_>) -> std::io::Result<()> {
-    writeln!(out, "{}: {}", arguments.file.display(), report.format)?;
+/// What a column holds that holds no numbers; any other error remains one.
+fn kind(error: Error) -> Result<&'static str, Error> {
+    match &error {
+        Error::File { problem, .. } => match **problem {
+            Error::ColumnKind { found, .. } => Ok(found),
+            _ => Err(error),
+        },
+        _ => Err(error),
+    }
+}
+
+fn write_text(out: &mut String, arguments: &Arguments, report: &Report<'_>) -> std::fmt::Result {
+    writeln!(out, "{}: {}", shown(&arguments.file), report.format)?;
     for Table { table, fields } in &report.tables {
         let name = table.name.as_deref().map(|n| format!(" '{n}'")).unwrap_or_default();
         let assumed = if table.ordering_assumed { " (assumed, the file does not say)" } else { "" };
@@ -110,18 +133,15 @@ fn print(out: &mut impl Write, arguments: &Arguments, report: &Report<'_>) -> st
             "no.", "field", "unit", "min", "max", "mean", "std. dev.", "masked"
         )?;
         for (i, f) in fields.iter().enumerate() {
-            let show = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.6e}"));
-            writeln!(
-                out,
-                "  {i:>3} {:<20} {:<12} {:>13} {:>13} {:>13} {:>13} {:>7.3}%",
-                f.field.name,
-                f.field.unit.as_deref().unwrap_or("-"),
-                show(f.min),
-                show(f.max),
-                show(f.mean),
-                show(f.standard_deviation),
-                100.0 * f.masked_fraction
-            )?;
+            let unit = f.field.unit.as_deref().unwrap_or("-");
+            write!(out, "  {i:>3} {:<20} {unit:<12}", f.field.name)?;
+            let Some(masked) = f.masked_fraction else {
+                writeln!(out, " is {}, not a map of numbers", f.not_a_map.unwrap_or_default())?;
+                continue;
+            };
+            let show = |x: Option<f64>| x.map_or("-".to_owned(), |x| decimals(x, 6));
+            let [min, max, mean, sigma] = [f.min, f.max, f.mean, f.standard_deviation].map(show);
+            writeln!(out, " {min:>13} {max:>13} {mean:>13} {sigma:>13} {:>7.3}%", 100.0 * masked)?;
         }
     }
     Ok(())

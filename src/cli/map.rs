@@ -1,17 +1,19 @@
 //! `longan map`: Minkowski maps of one or many files.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use longan::formats::{self, Healpix, Map, Ordering};
-use longan::measures::{BuiltIn, Measure};
+use longan::measures::{BuiltIn, Measure, find};
 use longan::statistics::statistics;
 use longan::{Analysis, Weight};
 
-use super::options::{BodyOptions, Input, Running, between, measure};
+use super::options::{BodyOptions, Input, Running, between, check_memory, decimals, nside, shown};
 use super::output::Provenance;
 use super::progress::Progress;
 
@@ -37,13 +39,14 @@ pub(crate) struct Arguments {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Measures, separated by commas; `longan measures` explains them all.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "evq", value_parser = measure)]
-    measure: Vec<BuiltIn>,
-    /// Radius of the window in degrees; 0: each pixel by itself, at the map's own Nside.
-    #[arg(long, value_name = "DEG", default_value_t = 6.0, value_parser = |t: &str| between(t, 0.0, 180.0))]
+    #[arg(long, value_name = "LIST", default_value = "evq")]
+    measure: Measures,
+    /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside.
+    #[arg(long, value_name = "DEG", default_value_t = 6.0)]
+    #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
     window: f64,
     /// Nside of the output [default: the smaller of 16 and the input's].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
     nside_out: Option<usize>,
     /// Weight of the contour's pieces in tensors: their length (W_1) or their curvature (W_2).
     #[arg(long, value_name = "WEIGHT", default_value = "length")]
@@ -51,8 +54,9 @@ pub(crate) struct Arguments {
     /// Write one extension for each threshold instead of the mean over thresholds.
     #[arg(long)]
     sequence: bool,
-    /// Windows with a larger share of masked cells than this are masked.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0625, value_parser = |t: &str| between(t, 0.0, 1.0))]
+    /// Windows with a larger share of masked cells than this, from 0 to 1, are masked.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0625)]
+    #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 1.0))]
     max_masked: f64,
     #[command(flatten)]
     body: BodyOptions,
@@ -67,11 +71,37 @@ pub(crate) struct Arguments {
     /// Replace existing outputs.
     #[arg(long, help_heading = "Output")]
     overwrite: bool,
-    /// With several inputs: skip those whose output exists.
+    /// Skip inputs whose output exists, to go on with an interrupted run.
     #[arg(long, help_heading = "Output", conflicts_with = "overwrite")]
     resume: bool,
     #[command(flatten)]
     running: Running,
+}
+
+/// Measures, no two the same.
+#[derive(Clone, Debug)]
+struct Measures(Vec<BuiltIn>);
+
+/// Columns that a FITS table can have.
+const COLUMNS_MAX: usize = 999;
+
+impl FromStr for Measures {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut measures: Vec<BuiltIn> = Vec::new();
+        for name in text.split(',') {
+            let measure = find(name.trim()).map_err(|e| e.to_string())?;
+            if measures.iter().any(|other| other.name() == measure.name()) {
+                return Err(format!("'{}' is given twice", measure.name()));
+            }
+            measures.push(measure);
+        }
+        if measures.len() > COLUMNS_MAX {
+            return Err(format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len()));
+        }
+        Ok(Measures(measures))
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -104,7 +134,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         0 => Ok(()),
         n => {
             let reasons: Vec<String> = failed.iter().map(|e| format!("\n  {e:#}")).collect();
-            bail!("{n} of {} inputs failed, the others are done:{}", jobs.len(), reasons.concat())
+            let others = if n < jobs.len() { ", the others are done" } else { "" };
+            bail!("{n} of {} inputs failed{others}:{}", jobs.len(), reasons.concat())
         }
     }
 }
@@ -112,35 +143,47 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 impl Arguments {
     /// Inputs and their outputs, those that are finished left out, after all checks that need no reading.
     fn jobs(&self) -> anyhow::Result<Vec<(&Path, PathBuf)>> {
-        let into_folder = self.inputs.len() > 1 || self.output.is_dir() || self.output.to_string_lossy().ends_with('/');
-        if into_folder && !self.output.is_dir() {
-            std::fs::create_dir_all(&self.output)
-                .with_context(|| format!("cannot make the output folder '{}'", self.output.display()))?;
-        }
+        let out = &self.output;
+        let into_folder = self.inputs.len() > 1 || out.is_dir() || out.to_string_lossy().ends_with('/');
+        ensure!(
+            !into_folder || !out.is_file(),
+            "{}: this is a file, but the output has to be a folder here",
+            shown(out)
+        );
         let mut inputs = BTreeMap::new();
         let mut jobs = Vec::new();
         for input in &self.inputs {
             let output = match input.file_name() {
-                Some(name) if into_folder => self.output.join(name),
-                None if into_folder => bail!("the input '{}' is not a file", input.display()),
-                _ => self.output.clone(),
+                Some(name) if into_folder => out.join(name),
+                None if into_folder => bail!("{}: this is not a file; name files", shown(input)),
+                _ => out.clone(),
             };
             if let Some(other) = inputs.insert(output.clone(), input) {
                 bail!(
-                    "the inputs '{}' and '{}' have the same name, so both would be written to '{}'",
-                    other.display(),
-                    input.display(),
-                    output.display()
+                    "the inputs {} and {} would both be written to {}; map them into different folders",
+                    shown(other),
+                    shown(input),
+                    shown(&output)
                 );
             }
-            if let (Ok(from), Ok(to)) = (input.canonicalize(), output.canonicalize()) {
-                ensure!(from != to, "the output would replace the input '{}'; choose another", input.display());
+            for source in std::iter::once(input).chain(&self.input.mask) {
+                if let (Ok(from), Ok(to)) = (source.canonicalize(), output.canonicalize()) {
+                    ensure!(from != to, "{}: the output would replace this input; choose another", shown(source));
+                }
             }
-            if self.resume && output.exists() {
-                continue;
-            }
-            formats::check_writable(&output, self.overwrite)?;
             jobs.push((input.as_path(), output));
+        }
+        if into_folder {
+            std::fs::create_dir_all(out).with_context(|| format!("{}: cannot make this folder", shown(out)))?;
+        }
+        if self.resume {
+            jobs.retain(|(_, output)| !output.is_file());
+            let finished = self.inputs.len() - jobs.len();
+            self.running
+                .say(format_args!("{finished} of {} outputs exist, and stay as they are", self.inputs.len()))?;
+        }
+        for (_, output) in &jobs {
+            formats::check_writable(output, self.overwrite)?;
         }
         Ok(jobs)
     }
@@ -162,25 +205,26 @@ impl Arguments {
         let start = Instant::now();
         let map = self.input.read(path, mask)?;
         let analysis = self.analysis();
-        let about = || path.display().to_string();
-        let ordering = self.ordering_for(&map, analysis.check(map.grid()).with_context(about)?)?;
-        let progress = Progress::new(path.display().to_string(), self.running.quiet);
+        let about = || shown(path);
+        let grid = analysis.check(map.grid()).with_context(about)?;
+        let ordering = self.ordering_for(&map, grid).with_context(about)?;
+        let measures = &self.measure.0;
+        let extensions = if self.sequence { analysis.thresholds.values().len() } else { 1 };
+        check_memory(grid, extensions * measures.len()).with_context(about)?;
+        let progress = Progress::new(about(), self.running.quiet);
         let maps = if self.sequence {
-            analysis.sequence(&map, &self.measure, |share| progress.set(share))
+            analysis.sequence(&map, measures, |share| progress.set(share))
         } else {
-            analysis.minkowski_maps(&map, &self.measure, |share| progress.set(share)).map(|maps| vec![maps])
+            analysis.minkowski_maps(&map, measures, |share| progress.set(share)).map(|maps| vec![maps])
         }
         .with_context(about)?;
         drop(progress);
         let summary = self.summary(&maps[0].values[0], maps[0].grid);
         let provenance =
             Provenance { path, map: &map, input: &self.input, analysis: &analysis, command: self.command(path) };
-        let file = provenance.file(maps, &self.measure, ordering, self.float32);
+        let file = provenance.file(maps, measures, ordering, self.float32);
         formats::write_healpix(output, &file, self.overwrite)?;
-        if !self.running.quiet {
-            println!("{}: {summary} ({:.2} s)", output.display(), start.elapsed().as_secs_f64());
-        }
-        Ok(())
+        self.running.say(format_args!("{}: {summary} ({:.2} s)", shown(output), start.elapsed().as_secs_f64()))
     }
 
     fn ordering_for(&self, map: &Map, grid: Healpix) -> anyhow::Result<Ordering> {
@@ -197,27 +241,21 @@ impl Arguments {
 
     /// What the first column holds, in a few words.
     fn summary(&self, values: &[f64], grid: Healpix) -> String {
-        let name = self.measure[0].column();
-        let all = format!("{} of Nside {}", name, grid.nside());
-        match statistics(values) {
-            None => format!("{all} is masked or undefined everywhere"),
-            Some(s) => format!(
-                "{all} from {:.4} to {:.4}, mean {:.4}, {} of {} pixels masked",
-                s.min,
-                s.max,
-                s.mean,
-                values.len() - s.unmasked,
-                values.len()
-            ),
-        }
+        let all = format!("{} of Nside {}", self.measure.0[0].column(), grid.nside());
+        let Some(s) = statistics(values) else { return format!("{all} is masked or undefined everywhere") };
+        let [min, max, mean] = [s.min, s.max, s.mean].map(|x| decimals(x, 4));
+        let (without, pixels) = (values.len() - s.unmasked, values.len());
+        format!("{all} from {min} to {max}, mean {mean}, {without} of {pixels} pixels masked or undefined")
     }
 
     /// The command that makes this output: as given, with this input only.
     fn command(&self, input: &Path) -> String {
-        let others: Vec<_> = self.inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
-        let words = std::env::args_os().skip(1).filter(|word| !others.contains(&word.as_os_str()));
-        let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
-        let quoted = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_else(|_| words.join(" "));
+        let others: HashSet<_> = self.inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
+        let words: Vec<_> = std::env::args_os().collect();
+        // A mask may be an input too.
+        let kept = |pair: &&[OsString]| ["-m", "--mask"].iter().any(|m| pair[0] == *m) || !others.contains(&*pair[1]);
+        let words: Vec<_> = words.windows(2).filter(kept).map(|pair| pair[1].to_string_lossy()).collect();
+        let quoted = shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_else(|_| words.join(" "));
         format!("longan {quoted}")
     }
 }

@@ -1,10 +1,12 @@
 //! `longan measures`: the list of all measures.
 
-use std::io::Write;
+use std::fmt::Write;
 
 use clap::{Args, ValueEnum};
 use longan::measures::BUILT_INS;
 use serde::Serialize;
+
+use super::options::print;
 
 /// Every measure, with its definition, unit and rank; N stands for any rank from 1.
 #[derive(Args, Debug)]
@@ -35,12 +37,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         unit: kind.unit,
         definition: kind.definition,
     });
-    let mut out = std::io::stdout().lock();
+    let mut out = String::new();
     match arguments.format {
-        Format::Json => {
-            serde_json::to_writer_pretty(&mut out, &lines.collect::<Vec<_>>())?;
-            writeln!(out)?;
-        }
+        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&lines.collect::<Vec<_>>())?)?,
         Format::Text => {
             writeln!(out, "{:<16} {:>4} {:>5}  definition", "name", "rank", "unit")?;
             for line in lines {
@@ -54,5 +53,5 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             )?;
         }
     }
-    Ok(())
+    print(&out)
 }

@@ -23,11 +23,11 @@ use clap::{Parser, Subcommand};
 #[command(version, arg_required_else_help = true, subcommand_required = true, propagate_version = true)]
 #[command(after_help = "\
 Examples:
-  longan map sky.fits -o sky_evq.fits                     the paper's analysis: EVQ in windows of 6 degrees
-  longan map sky.fits -o out.fits --measure evq,psi2,psi2-direction --window 10 --nside-out 32
-  longan map sims/*.fits -o maps/ --resume                many maps, one output each
-  longan totals sky.fits --thresholds -2:2:9 --threshold-unit sigma
-  longan demo                                             everything on simulated data, with a picture
+  longan demo                            all of it on simulated data, with a picture
+  longan info sky.fits                   what a file holds
+  longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
+  longan map sims/*.fits -o maps/        many maps, one output each
+  longan totals sky.fits                 area, length and Euler characteristic
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
 Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]
@@ -48,7 +48,6 @@ enum Command {
 
 /// Runs the program.
 pub(crate) fn main() -> ExitCode {
-    // A reader that closes the pipe early, such as `head`, is no error.
     let done = match Arguments::parse().command {
         Command::Map(arguments) => map::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
@@ -59,9 +58,6 @@ pub(crate) fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(e) if e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe) => {
-            ExitCode::SUCCESS
-        }
         Err(e) => {
             let _ = writeln!(std::io::stderr(), "longan: {e:#}");
             ExitCode::FAILURE

@@ -1,11 +1,13 @@
 //! Options that several commands share, and how their values are read.
 
+use std::fmt::Display;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use longan::formats::{self, Field, Map, Selection};
-use longan::measures::{BuiltIn, UnknownMeasure, find};
+use longan::formats::{self, Field, Healpix, Map, Selection};
 use longan::{Analysis, Body, ThresholdUnit, Thresholds};
 
 /// Which field of a file, and which pixels of it.
@@ -16,10 +18,10 @@ pub(crate) struct Input {
     #[arg(long, value_name = "NAME|NUMBER", value_parser = field)]
     pub(crate) field: Option<Field>,
     /// Number of the FITS extension, 0 for the primary one [default: the first with a map].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
     pub(crate) hdu: Option<usize>,
     /// For multi-order (UNIQ) files: Nside to bring the map to [default: that of its finest cells].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
     pub(crate) nside: Option<usize>,
     /// Mask file, of any ordering and number type; pixels below the mask threshold are left out.
     #[arg(long, short, value_name = "FILE")]
@@ -44,7 +46,7 @@ impl Input {
         let selection = Selection { field: self.field.clone(), hdu: self.hdu, nside: self.nside };
         let mut map = formats::read(path, &selection)?;
         if let Some(mask) = mask {
-            map.apply_mask(mask, self.mask_threshold).with_context(|| path.display().to_string())?;
+            map.apply_mask(mask, self.mask_threshold).with_context(|| shown(path))?;
         }
         Ok(map)
     }
@@ -106,9 +108,9 @@ pub(crate) enum UnitOption {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Running")]
 pub(crate) struct Running {
-    /// Number of threads; results do not depend on it [default: one for each processor].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) threads: Option<u16>,
+    /// Number of threads, up to 1024; results do not depend on it [default: one for each processor].
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Print nothing but errors.
     #[arg(long, short)]
     pub(crate) quiet: bool,
@@ -118,19 +120,72 @@ impl Running {
     /// Sets the number of threads.
     pub(crate) fn start(&self) -> anyhow::Result<()> {
         if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+            pool.build_global().with_context(|| format!("cannot start {threads} threads"))?;
         }
         Ok(())
     }
+
+    /// Prints a line, unless nothing is to be printed.
+    pub(crate) fn say(&self, line: impl Display) -> anyhow::Result<()> {
+        if self.quiet { Ok(()) } else { print(&format!("{line}\n")) }
+    }
+
+    /// Prints a line to standard error, unless nothing is to be printed.
+    pub(crate) fn warn(&self, line: impl Display) {
+        if !self.quiet {
+            // There is no other place to complain to.
+            let _ = writeln!(io::stderr(), "longan: {line}");
+        }
+    }
+}
+
+/// Prints a text. A reader that closes the pipe early, such as `head`, is no error; a full disk is.
+pub(crate) fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        printed => printed.context("cannot print"),
+    }
+}
+
+/// A number with this many decimals, as a power of ten where they would hide it or it is large.
+pub(crate) fn decimals(x: f64, decimals: usize) -> String {
+    match x.abs() {
+        0.0 | 1e-3..1e6 => format!("{x:.decimals$}"),
+        _ => format!("{x:.decimals$e}"),
+    }
+}
+
+/// A path on one line.
+pub(crate) fn shown(path: &Path) -> String {
+    path.display().to_string().replace(char::is_control, "\u{fffd}")
+}
+
+/// Refuses `count` maps of this grid where there is not the memory for them.
+pub(crate) fn check_memory(grid: Healpix, count: usize) -> anyhow::Result<()> {
+    let room = grid.pixels().checked_mul(count).map(|values| Vec::<f64>::new().try_reserve_exact(values));
+    anyhow::ensure!(
+        room.is_some_and(|room| room.is_ok()),
+        "an output of Nside {} needs more memory than there is; choose a smaller one",
+        grid.nside()
+    );
+    Ok(())
 }
 
 fn field(text: &str) -> Result<Field, std::convert::Infallible> {
     text.parse()
 }
 
-/// A measure by its name.
-pub(crate) fn measure(text: &str) -> Result<BuiltIn, UnknownMeasure> {
-    find(text.trim())
+/// A whole number from 0.
+pub(crate) fn whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| "not a whole number from 0".to_owned())
+}
+
+/// An Nside.
+pub(crate) fn nside(text: &str) -> Result<usize, String> {
+    let nside = text.parse().map_err(|_| "not a whole number from 1 to 2^29".to_owned())?;
+    Healpix::new(nside).map(Healpix::nside).map_err(|e| e.to_string())
 }
 
 /// A finite number.
@@ -142,4 +197,9 @@ pub(crate) fn finite(text: &str) -> Result<f64, String> {
 pub(crate) fn between(text: &str, low: f64, high: f64) -> Result<f64, String> {
     let x = finite(text)?;
     if (low..=high).contains(&x) { Ok(x) } else { Err(format!("not between {low} and {high}")) }
+}
+
+/// An angle in degrees, above 0 and at most 90.
+pub(crate) fn acute(text: &str) -> Result<f64, String> {
+    between(text, 0.0, 90.0).ok().filter(|x| *x > 0.0).ok_or_else(|| "not above 0 and at most 90".to_owned())
 }

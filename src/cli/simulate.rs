@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use longan::formats::{self, Card, Column, Extension, Healpix, HealpixFile, Map, Ordering};
 use longan::simulate::{Body, Edge, Shape, Waves, scene, shapes};
 
-use super::options::{Running, between};
+use super::options::{Running, acute, between, check_memory, finite, nside, shown, whole};
 use super::output::{creator, integer, real, text};
 
 /// A map whose shape is known: bodies of simple outline, or a Gaussian random field.
@@ -34,7 +35,7 @@ struct Output {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Nside of the map.
-    #[arg(long, value_name = "N", default_value_t = 512, value_parser = nside)]
+    #[arg(long, value_name = "N", default_value_t = 512, allow_negative_numbers = true, value_parser = nside)]
     nside: usize,
     /// Replace an existing output.
     #[arg(long)]
@@ -53,13 +54,16 @@ struct ShapesArguments {
     #[arg(long, value_name = "NAME", value_parser = Shape::ALL.map(Shape::name))]
     shape: Option<String>,
     /// Centre of that body: longitude and latitude in degrees.
-    #[arg(long, value_name = "LON,LAT", default_value = "0,0", allow_hyphen_values = true, value_parser = point)]
+    #[arg(long, value_name = "LON,LAT", default_value = "0,0", requires = "shape")]
+    #[arg(allow_hyphen_values = true, value_parser = point)]
     centre: (f64, f64),
     /// Its size in degrees: the longer side, or the diameter.
-    #[arg(long, value_name = "DEG", default_value_t = 6.0, value_parser = |t: &str| between(t, 0.0, 90.0))]
+    #[arg(long, value_name = "DEG", default_value_t = 6.0, requires = "shape")]
+    #[arg(allow_negative_numbers = true, value_parser = acute)]
     size: f64,
     /// Angle by which it is turned from north towards east, in degrees.
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, requires = "shape")]
+    #[arg(allow_negative_numbers = true, value_parser = finite)]
     angle: f64,
     /// Binary: 1 or 0 by the pixel's centre, to be contoured at 0.5. Smooth: the distance to the edge in degrees,
     /// positive inside, to be contoured at 0.
@@ -82,18 +86,13 @@ enum EdgeOption {
 #[derive(Args, Debug)]
 struct WavesArguments {
     /// Correlation angle in degrees.
-    #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = |t: &str| between(t, 0.0, 90.0))]
+    #[arg(long, value_name = "DEG", default_value_t = 3.0, allow_negative_numbers = true, value_parser = acute)]
     correlation: f64,
     /// Seed; the same gives the same field.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole::<u64>)]
     seed: u64,
     #[command(flatten)]
     output: Output,
-}
-
-fn nside(text: &str) -> Result<usize, String> {
-    let nside = text.parse().map_err(|_| "not a whole number".to_owned())?;
-    Healpix::new(nside).map(Healpix::nside).map_err(|e| e.to_string())
 }
 
 fn point(text: &str) -> Result<(f64, f64), String> {
@@ -132,14 +131,12 @@ impl WavesArguments {
     fn run(&self) -> anyhow::Result<()> {
         let waves = Waves::new(self.correlation, self.seed)?;
         let cards = waves_cards(&waves, self.correlation, self.seed);
-        if let Some(warning) = waves.warning(Healpix::new(self.output.nside)?) {
-            eprintln!("longan: {warning}");
-        }
         self.output.write(|grid| waves.map(grid), cards)?;
-        if !self.output.running.quiet {
-            println!("sigma0 = {}, sigma1 = {} per radian", waves.sigma0(), waves.sigma1());
+        let running = &self.output.running;
+        if let Some(warning) = waves.warning(Healpix::new(self.output.nside)?) {
+            running.warn(warning);
         }
-        Ok(())
+        running.say(format_args!("sigma0 = {}, sigma1 = {} per radian", waves.sigma0(), waves.sigma1()))
     }
 }
 
@@ -175,11 +172,10 @@ impl Output {
     fn write(&self, make: impl FnOnce(Healpix) -> Map, cards: Vec<Card>) -> anyhow::Result<()> {
         self.running.start()?;
         formats::check_writable(&self.output, self.overwrite)?;
-        let map = make(Healpix::new(self.nside)?);
+        let grid = Healpix::new(self.nside)?;
+        check_memory(grid, 2).with_context(|| shown(&self.output))?;
+        let map = make(grid);
         formats::write_healpix(&self.output, &file(&map, cards), self.overwrite)?;
-        if !self.running.quiet {
-            println!("{}: {} at Nside {}", self.output.display(), map.name, self.nside);
-        }
-        Ok(())
+        self.running.say(format_args!("{}: {} at Nside {}", shown(&self.output), map.name, self.nside))
     }
 }

@@ -1,13 +1,13 @@
 //! `longan totals`: Minkowski functionals of the whole sphere.
 
-use std::io::Write;
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::options::{BodyOptions, Input, Running};
+use super::options::{BodyOptions, Input, Running, decimals, print, shown};
 
 /// Area, length, curvature and Euler characteristic of the body, at each threshold, over the whole sphere.
 ///
@@ -55,8 +55,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let path = &arguments.input_file;
     let mask = arguments.input.read_mask()?;
     let map = arguments.input.read(path, mask.as_ref())?;
-    let (thresholds, totals, masked) =
-        arguments.body.analysis().totals(&map).with_context(|| path.display().to_string())?;
+    let (thresholds, totals, masked) = arguments.body.analysis().totals(&map).with_context(|| shown(path))?;
     let whole = map.values().iter().all(|v| !v.is_nan());
     let rows: Vec<Row> = thresholds
         .values()
@@ -71,12 +70,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             masked_area_sr: masked,
         })
         .collect();
-    let mut out = std::io::stdout().lock();
+    let mut out = String::new();
     match arguments.format {
-        Format::Json => {
-            serde_json::to_writer_pretty(&mut out, &rows)?;
-            writeln!(out)?;
-        }
+        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&rows)?)?,
         Format::Csv => {
             writeln!(out, "threshold,area_sr,length_rad,curvature_rad,euler_characteristic,masked_area_sr")?;
             for r in rows {
@@ -95,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 let euler = r.euler_characteristic.map(|x| x.to_string()).unwrap_or_default();
                 let line = format!(
                     "{:>16} {:>14.9} {:>14.7} {:>16.7} {euler:>8}",
-                    format!("{:.7}", r.threshold),
+                    decimals(r.threshold, 7),
                     r.area_sr,
                     r.length_rad,
                     r.curvature_rad
@@ -107,5 +103,5 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             }
         }
     }
-    Ok(())
+    print(&out)
 }
