@@ -37,7 +37,7 @@ fn totals_in_every_format() {
         for ((row, line), (numbers, euler)) in json.as_array().unwrap().iter().zip(&lines).zip(&csv) {
             let [_, area, _, curvature, masked_area] = numbers[..] else { panic!("{numbers:?}") };
             let keys = ["threshold", "area_sr", "length_rad", "curvature_rad", "masked_area_sr"];
-            assert!(difference(&keys.map(|key| row[key].as_f64().unwrap()), &numbers) < 1e-14);
+            assert!(difference(&keys.map(|key| row[key].as_f64().unwrap()), numbers) < 1e-14);
             assert_eq!(row["euler_characteristic"].as_i64(), *euler);
             let cells: Vec<f64> = line.split_whitespace().map(|c| c.parse().unwrap()).collect();
             assert_eq!(cells.len(), if masked { 4 } else { 5 }, "{line}");
