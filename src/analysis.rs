@@ -13,7 +13,7 @@ use crate::moments::{Selection, Weight};
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
 use crate::totals::{Totals, totals};
-use crate::window::{Moments, windows};
+use crate::window::{Moments, Summation, Ways, Windows, windows};
 
 /// What thresholds are counted in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +42,8 @@ pub struct Analysis {
     pub nside_out: Option<usize>,
     /// Windows with a larger share of masked cells are masked.
     pub max_masked: f64,
+    /// How windows are summed.
+    pub summation: Summation,
 }
 
 impl Default for Analysis {
@@ -54,6 +56,7 @@ impl Default for Analysis {
             weight: Weight::Length,
             nside_out: None,
             max_masked: 1.0 / 16.0,
+            summation: Summation::default(),
         }
     }
 }
@@ -126,6 +129,8 @@ pub struct MinkowskiMaps {
     pub of_map: Statistics,
     /// For each measure, in the order given, its values in RING order; NaN where masked or undefined.
     pub values: Vec<Vec<f64>>,
+    /// How windows were summed.
+    pub ways: Ways,
 }
 
 impl Analysis {
@@ -239,8 +244,18 @@ impl Analysis {
             }
         };
         let field = Field::new(map.grid(), map.values(), &thresholds, self.body);
-        let values = windows(&field, &selection, grid, self.window.to_radians(), measures.len(), evaluate, progress);
-        Ok(MinkowskiMaps { grid, thresholds, of_map, values })
+        let Windows { columns: values, ways } = windows(
+            &field,
+            &selection,
+            grid,
+            &[self.window.to_radians()],
+            self.summation,
+            measures.len(),
+            evaluate,
+            progress,
+        )
+        .remove(0);
+        Ok(MinkowskiMaps { grid, thresholds, of_map, values, ways })
     }
 
     /// Area, length and curvature of the whole unmasked sphere for each threshold, with the thresholds in the map's

@@ -27,6 +27,14 @@ impl RingTransport {
         RingTransport { sines: sin_x * sin_w, one_plus_cosines: 1.0 + cos_x * cos_w, sum_of_cosines: cos_x + cos_w }
     }
 
+    /// dδ/dΔφ.
+    pub fn rate(&self, dphi: f64) -> f64 {
+        // δ = 2 atan(t tan(Δφ/2)) with t its rate at 0.
+        let t = self.sum_of_cosines / (self.one_plus_cosines + self.sines);
+        let (sin, cos) = (dphi / 2.0).sin_cos();
+        t / (cos * cos + t * t * sin * sin)
+    }
+
     /// e^{iδ} for a difference Δφ = φ_x − φ_w of longitude; 1 at the antipode, where no geodesic is singled out.
     #[inline(always)]
     pub fn phase(&self, cos_dphi: f64, sin_dphi: f64) -> Complex64 {

@@ -1,10 +1,14 @@
 //! Moments of moving windows: pixels within a radius of an output pixel, transported to its centre and summed.
 //!
 //! Works from north to south, holding pixel moments only for the rings that the windows of the present output rings
-//! reach. What a window's moments mean is left to whoever visits them.
+//! reach. The sum over a window's pixels is taken one by one ([`direct`]), or ring by ring from prefix sums
+//! ([`prefix`]), whichever costs less. What a window's moments mean is left to whoever visits them.
+
+mod direct;
+mod prefix;
+mod reach;
 
 use std::collections::VecDeque;
-use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use longan_formats::Healpix;
@@ -13,16 +17,10 @@ use rayon::prelude::*;
 
 use crate::contour::Field;
 use crate::moments::{self, Layout, RingMoments, SHARES, Selection};
-use crate::transport::{Phases, Powers, RingTransport};
+use reach::{OutputRing, rings_within};
 
 /// Rings of input moments that are made at a time, at least.
 const BAND: usize = 128;
-
-/// Pixels transported at a time.
-const BLOCK: usize = 32;
-
-/// Numbers summed side by side, as many as the widest vector units hold.
-const LANES: usize = 8;
 
 /// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]
@@ -41,48 +39,110 @@ pub struct Moments {
     pub psi: Vec<Complex64>,
 }
 
-/// Visits the windows of radius `radius` (radians; 0: the input pixel itself) about all pixels of `output`.
+/// How windows are summed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Summation {
+    /// Pixel by pixel.
+    Exact,
+    /// From prefix sums wherever that costs less and the phases of transport are met to this accuracy: then ψ_s is
+    /// off by at most this share of the window's W1. Areas, lengths, curvatures and masked fractions stay exact.
+    Tolerance(f64),
+}
+
+impl Default for Summation {
+    /// A tolerance of 10⁻⁷.
+    fn default() -> Self {
+        Summation::Tolerance(1e-7)
+    }
+}
+
+/// Which way the windows of one radius were summed, counted in pairs of an output pixel and an input ring.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ways {
+    /// Pairs summed pixel by pixel.
+    pub direct: usize,
+    /// Pairs from prefix sums.
+    pub prefix: usize,
+    /// Largest error of a phase in those.
+    pub error: f64,
+    /// Largest number of terms to a phase.
+    pub terms: usize,
+}
+
+/// Values of all windows of one radius.
+#[derive(Clone, Debug)]
+pub struct Windows {
+    /// What was visited, column by column, in RING order.
+    pub columns: Vec<Vec<f64>>,
+    /// How it was summed.
+    pub ways: Ways,
+}
+
+/// Visits the windows of each radius (radians; 0: the input pixel itself) about all pixels of `output`.
 ///
-/// `visit` fills `columns` numbers for each; they are returned column by column, in RING order. `progress` is told the
-/// share done, from 0 to 1. The result does not depend on the number of threads.
+/// `visit` fills `columns` numbers for each window. `progress` is told the share done, from 0 to 1. The result does not
+/// depend on the number of threads.
 ///
 /// # Panics
 /// For radius 0 if the output grid is not the input's.
+#[allow(clippy::too_many_arguments)]
 pub fn windows(
     field: &Field<'_>,
     selection: &Selection,
     output: Healpix,
-    radius: f64,
+    radii: &[f64],
+    summation: Summation,
     columns: usize,
     visit: impl Fn(&Moments, &mut [f64]) + Sync,
     mut progress: impl FnMut(f64),
-) -> Vec<Vec<f64>> {
-    assert!(radius > 0.0 || output == field.grid(), "a window of one pixel needs the input's grid");
-    let layout = Layout::new(selection, field.has_masked());
+) -> Vec<Windows> {
     let input = field.grid();
-    let mut out = vec![Vec::with_capacity(output.pixels()); columns];
+    let largest = radii.iter().copied().fold(0.0, f64::max);
+    assert!(!radii.contains(&0.0) || output == input, "a window of one pixel needs the input's grid");
+    let layout = Layout::new(selection, field.has_masked());
+    let empty = || vec![Vec::with_capacity(output.pixels()); columns];
+    let mut out: Vec<Windows> = radii.iter().map(|_| Windows { columns: empty(), ways: Ways::default() }).collect();
     let mut band = Band { first: 1, rings: VecDeque::new() };
     let mut next = 1;
     while next <= output.rings() {
         // As many output rings as make a band of input rings.
         let first = next;
-        let mut reach = rings_within(input, output, first, radius);
+        let mut reach = rings_within(input, output, first, largest);
         let lowest = reach.end + BAND;
-        while next < output.rings() && rings_within(input, output, next + 1, radius).end <= lowest {
+        while next < output.rings() && rings_within(input, output, next + 1, largest).end <= lowest {
             next += 1;
-            reach.end = reach.end.max(rings_within(input, output, next, radius).end);
+            reach.end = reach.end.max(rings_within(input, output, next, largest).end);
         }
         next += 1;
         band.advance(field, &layout, reach);
-        let rings: Vec<OutputRing> =
-            (first..next).into_par_iter().map(|i| OutputRing::new(input, output, i, radius)).collect();
-        let quadrants: Vec<Vec<f64>> = (0..4 * rings.len())
-            .into_par_iter()
-            .map(|i| rings[i / 4].quadrant(i % 4, &band, &layout, field.thresholds(), columns, &visit))
-            .collect();
-        for quadrant in &quadrants {
-            for (column, out) in out.iter_mut().enumerate() {
-                out.extend(quadrant.iter().skip(column).step_by(columns));
+        for (&radius, out) in radii.iter().zip(&mut out) {
+            let rings: Vec<OutputRing> =
+                (first..next).into_par_iter().map(|i| OutputRing::new(input, output, i, radius)).collect();
+            let groups = prefix::groups(&rings, &layout, radius, summation);
+            let quadrants: Vec<(Vec<Sums>, Ways)> = (0..4 * groups.len())
+                .into_par_iter()
+                .map(|task| {
+                    let (group, quadrant) = (&groups[task / 4], task % 4);
+                    let rings = &rings[group.rings.clone()];
+                    match &group.plan {
+                        Some(plan) => prefix::sums(rings, quadrant, &band, &layout, plan),
+                        None => direct_sums(rings, quadrant, &band, &layout, radius == 0.0),
+                    }
+                })
+                .collect();
+            for (group, quadrants) in groups.iter().zip(quadrants.chunks_exact(4)) {
+                for (i, ring) in rings[group.rings.clone()].iter().enumerate() {
+                    let values: Vec<Vec<f64>> = (0..4usize)
+                        .into_par_iter()
+                        .map(|q| visited(ring, q, &quadrants[q].0[i], &layout, field.thresholds(), columns, &visit))
+                        .collect();
+                    for values in values {
+                        for (column, out) in out.columns.iter_mut().enumerate() {
+                            out.extend(values.iter().skip(column).step_by(columns));
+                        }
+                    }
+                }
+                quadrants.iter().for_each(|(_, ways)| out.ways.add(*ways));
             }
         }
         let done = output.ring(next - 1);
@@ -91,23 +151,86 @@ pub fn windows(
     out
 }
 
-/// The input rings that windows about an output ring may reach.
-fn rings_within(input: Healpix, output: Healpix, ring: usize, radius: f64) -> Range<usize> {
-    if radius == 0.0 {
-        return ring..ring + 1;
+impl Ways {
+    fn add(&mut self, other: Ways) {
+        self.direct += other.direct;
+        self.prefix += other.prefix;
+        self.error = self.error.max(other.error);
+        self.terms = self.terms.max(other.terms);
     }
-    let theta = output.ring(ring).theta();
-    let first_south_of = |theta: f64| {
-        let (mut north, mut south) = (1, input.rings() + 1);
-        while north < south {
-            let middle = (north + south) / 2;
-            if input.ring(middle).theta() < theta { north = middle + 1 } else { south = middle }
+}
+
+/// Windows of a quadrant of each output ring, pixel by pixel; `single`: of one pixel each.
+fn direct_sums(rings: &[OutputRing], quadrant: usize, band: &Band, layout: &Layout, single: bool) -> (Vec<Sums>, Ways) {
+    let sums = rings.iter().map(|ring| {
+        if !single {
+            return direct::sums(ring, quadrant, band, layout);
         }
-        north
-    };
-    // One ring more on each side: which pixels are in the window is decided for each ring.
-    let (north, south) = (first_south_of(theta - radius), first_south_of(theta + radius));
-    north.saturating_sub(1).max(1)..(south + 1).min(input.rings() + 1)
+        let mut sums = Sums::new(ring.in_quadrant, layout.rows);
+        let moments = band.ring(ring.number);
+        for k in 0..ring.in_quadrant {
+            let column = quadrant * ring.in_quadrant + k;
+            let sums = sums.of(k, 1);
+            (0..layout.rows).for_each(|row| sums[row] = moments.row(row)[column]);
+        }
+        sums
+    });
+    let pairs = rings.iter().map(|ring| ring.in_quadrant * ring.reached.len()).sum();
+    (sums.collect(), Ways { direct: pairs, ..Ways::default() })
+}
+
+/// What `visit` makes of the windows of a quadrant.
+fn visited(
+    ring: &OutputRing,
+    quadrant: usize,
+    sums: &Sums,
+    layout: &Layout,
+    thresholds: usize,
+    columns: usize,
+    visit: impl Fn(&Moments, &mut [f64]),
+) -> Vec<f64> {
+    let mut out = vec![0.0; ring.in_quadrant * columns];
+    let mut moments = Moments::default();
+    for (k, out) in out.chunks_exact_mut(columns).enumerate() {
+        let sum = |row: usize| sums.data[k * sums.rows + row];
+        let mean = |row: usize| sum(row) / thresholds as f64;
+        let selected = |row: Option<usize>| row.map_or(0.0, mean);
+        moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
+        moments.masked_fraction = match (sums.pixels[k], layout.masked) {
+            (0, _) => 1.0,
+            (pixels, Some(row)) => sum(row) / (SHARES * pixels) as f64,
+            (_, None) => 0.0,
+        };
+        moments.area = selected(layout.area);
+        moments.length = selected(layout.length);
+        moments.curvature = selected(layout.curvature);
+        moments.psi.clear();
+        let rows = (layout.first_rank..layout.rows).step_by(2);
+        moments.psi.extend(rows.map(|row| Complex64::new(mean(row), mean(row + 1))));
+        visit(&moments, out);
+    }
+    out
+}
+
+/// Sums over the windows about consecutive pixels.
+struct Sums {
+    rows: usize,
+    /// The rows of each window.
+    data: Vec<f64>,
+    /// Number of pixels in each window.
+    pixels: Vec<usize>,
+}
+
+impl Sums {
+    fn new(windows: usize, rows: usize) -> Self {
+        Sums { rows, data: vec![0.0; windows * rows], pixels: vec![0; windows] }
+    }
+
+    /// The rows of a window, to which this many pixels are to be added.
+    fn of(&mut self, window: usize, pixels: usize) -> &mut [f64] {
+        self.pixels[window] += pixels;
+        &mut self.data[window * self.rows..(window + 1) * self.rows]
+    }
 }
 
 /// Pixel moments of consecutive rings.
@@ -142,203 +265,4 @@ impl Band {
     fn ring(&self, i: usize) -> &RingMoments {
         &self.rings[i - self.first]
     }
-}
-
-/// What the windows about one output ring have in common.
-struct OutputRing {
-    output: Healpix,
-    ring: usize,
-    /// Whether a window is its own pixel only; then no ring is reached.
-    single: bool,
-    reached: Vec<Reached>,
-}
-
-/// An input ring that windows about an output ring reach.
-struct Reached {
-    ring: usize,
-    len: usize,
-    /// Twice the longitude of the first pixel, in pixels.
-    shift: usize,
-    /// Largest |Δφ| within the window, in radians; π or more for the whole ring.
-    half_width: f64,
-    transport: RingTransport,
-    /// cos and sin of k pixels' longitude, k < BLOCK.
-    steps: Phases<BLOCK>,
-    /// The same for BLOCK pixels.
-    stride: Complex64,
-}
-
-impl OutputRing {
-    fn new(input: Healpix, output: Healpix, ring: usize, radius: f64) -> Self {
-        let centre = output.ring(ring);
-        let reached = rings_within(input, output, ring, radius).filter_map(|i| {
-            let r = input.ring(i);
-            // sin²(d/2) = sin²((θ_x − θ_w)/2) + sin θ_x sin θ_w sin²(Δφ/2), free of cancellation.
-            let beyond = (radius / 2.0).sin().powi(2) - ((r.theta() - centre.theta()) / 2.0).sin().powi(2);
-            let sin_sq = beyond / (r.sin_theta * centre.sin_theta);
-            if sin_sq < 0.0 {
-                return None;
-            }
-            let half_width = if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI };
-            let step = Complex64::cis(TAU / r.len as f64);
-            let mut steps = [Complex64::ONE; BLOCK];
-            (1..BLOCK).for_each(|k| steps[k] = if k == 1 { step } else { steps[k / 2] * steps[k - k / 2] });
-            let stride = steps[BLOCK / 2] * steps[BLOCK / 2];
-            let steps = Phases { re: steps.map(|s| s.re), im: steps.map(|s| s.im) };
-            Some(Reached {
-                ring: i,
-                len: r.len,
-                shift: usize::from(r.shifted),
-                half_width,
-                transport: RingTransport::new((r.sin_theta, r.cos_theta), (centre.sin_theta, centre.cos_theta)),
-                steps,
-                stride,
-            })
-        });
-        let single = radius == 0.0;
-        OutputRing { output, ring, single, reached: if single { Vec::new() } else { reached.collect() } }
-    }
-
-    /// Windows about the pixels of one quadrant of the ring. Longitudes are counted from the quadrant's own meridian,
-    /// so that a field turned by 90° gives the same windows to the last bit.
-    fn quadrant(
-        &self,
-        quadrant: usize,
-        band: &Band,
-        layout: &Layout,
-        thresholds: usize,
-        columns: usize,
-        visit: impl Fn(&Moments, &mut [f64]),
-    ) -> Vec<f64> {
-        let ring = self.output.ring(self.ring);
-        let in_quadrant = ring.len / 4;
-        let first = quadrant * in_quadrant;
-        let mut sums = vec![vec![0.0; layout.rows]; in_quadrant];
-        let mut pixels = vec![0; in_quadrant];
-        if self.single {
-            let moments = band.ring(self.ring);
-            for (k, sums) in sums.iter_mut().enumerate() {
-                pixels[k] = 1;
-                (0..layout.rows).for_each(|row| sums[row] = moments.row(row)[first + k]);
-            }
-        }
-        // Input ring by input ring, so that what neighbouring windows share is read once.
-        for reached in &self.reached {
-            let moments = band.ring(reached.ring);
-            for (k, sums) in sums.iter_mut().enumerate() {
-                let (columns, dphi) = reached.columns(ring.phi(k as isize), quadrant);
-                pixels[k] += columns.len();
-                if columns.end <= reached.len {
-                    add(moments, layout, columns, dphi, reached, sums);
-                } else {
-                    // Across φ = 0: put together first, so that the sum is the same wherever the window lies.
-                    let joined = moments.joined(columns.start..reached.len, 0..columns.end - reached.len);
-                    add(&joined, layout, 0..columns.len(), dphi, reached, sums);
-                }
-            }
-        }
-        let mut out = vec![0.0; in_quadrant * columns];
-        let mut moments = Moments::default();
-        for ((k, out), mut sums) in out.chunks_exact_mut(columns).enumerate().zip(sums) {
-            moments.centre = (ring.theta(), ring.phi((first + k) as isize));
-            moments.masked_fraction = match (pixels[k], layout.masked) {
-                (0, _) => 1.0,
-                (_, Some(row)) => sums[row] / (SHARES * pixels[k]) as f64,
-                (_, None) => 0.0,
-            };
-            sums.iter_mut().for_each(|sum| *sum /= thresholds as f64);
-            let selected = |row: Option<usize>| row.map_or(0.0, |row| sums[row]);
-            moments.area = selected(layout.area);
-            moments.length = selected(layout.length);
-            moments.curvature = selected(layout.curvature);
-            moments.psi.clear();
-            moments.psi.extend(sums[layout.first_rank..].chunks_exact(2).map(|p| Complex64::new(p[0], p[1])));
-            visit(&moments, out);
-        }
-        out
-    }
-}
-
-impl Reached {
-    /// The pixels within the window about longitude `phi` (of the first quadrant), moved on by `quadrant`s: columns,
-    /// which may run beyond the ring's end into its beginning, and the first one's Δφ.
-    fn columns(&self, phi: f64, quadrant: usize) -> (Range<usize>, f64) {
-        let (len, step) = (self.len as isize, TAU / self.len as f64);
-        let first_phi = self.shift as f64 * step / 2.0;
-        let (mut from, mut to) = (0, len);
-        if self.half_width < PI {
-            from = ((phi - self.half_width - first_phi) / step).ceil() as isize;
-            to = ((phi + self.half_width - first_phi) / step).floor() as isize + 1;
-            to = to.clamp(from, from + len);
-        }
-        let at = (from + quadrant as isize * len / 4).rem_euclid(len) as usize;
-        let dphi = (2 * from + self.shift as isize) as f64 * (step / 2.0) - phi;
-        (at..at + (to - from) as usize, dphi)
-    }
-}
-
-/// Adds the moments of a range of pixels of a ring, transported; the first pixel lies `dphi` east of the centre.
-#[multiversion::multiversion(targets = "simd")]
-fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, dphi: f64, reached: &Reached, sums: &mut [f64]) {
-    for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
-        *sum += sum_of(&ring.row(row)[columns.clone()]);
-    }
-    if layout.ranks.is_empty() {
-        return;
-    }
-    let mut base = Complex64::cis(dphi);
-    for start in columns.clone().step_by(BLOCK) {
-        let mut phases = Phases::<BLOCK>::default();
-        for k in 0..BLOCK {
-            let (step_re, step_im) = (reached.steps.re[k], reached.steps.im[k]);
-            let (cos, sin) = (base.re * step_re - base.im * step_im, base.re * step_im + base.im * step_re);
-            let phase = reached.transport.phase(cos, sin);
-            (phases.re[k], phases.im[k]) = (phase.re, phase.im);
-        }
-        base *= reached.stride;
-        let block = start..(start + BLOCK).min(columns.end);
-        let mut powers = Powers::new(phases);
-        for (i, &rank) in layout.ranks.iter().enumerate() {
-            let row = layout.first_rank + 2 * i;
-            let (re, im) = (&ring.row(row)[block.clone()], &ring.row(row + 1)[block.clone()]);
-            let sum = sum_of_turned(re, im, powers.raise(rank));
-            sums[row] += sum.re;
-            sums[row + 1] += sum.im;
-        }
-    }
-}
-
-/// Sum of the values, in lanes side by side.
-#[inline(always)]
-fn sum_of(values: &[f64]) -> f64 {
-    let mut lanes = [0.0; LANES];
-    let (chunks, rest) = values.as_chunks::<LANES>();
-    for chunk in chunks {
-        (0..LANES).for_each(|k| lanes[k] += chunk[k]);
-    }
-    (0..rest.len()).for_each(|k| lanes[k] += rest[k]);
-    lanes.iter().sum()
-}
-
-/// Sum of the complex numbers re + i im, each turned by its phase.
-#[inline(always)]
-fn sum_of_turned(re: &[f64], im: &[f64], by: &Phases<BLOCK>) -> Complex64 {
-    let (mut lanes_re, mut lanes_im) = ([0.0; LANES], [0.0; LANES]);
-    let mut add = |lane: usize, re: f64, im: f64, u: f64, v: f64| {
-        lanes_re[lane] += re * u - im * v;
-        lanes_im[lane] += re * v + im * u;
-    };
-    let (re_chunks, re_rest) = re.as_chunks::<LANES>();
-    let (im_chunks, im_rest) = im.as_chunks::<LANES>();
-    let (u_chunks, v_chunks) = (by.re.as_chunks::<LANES>().0, by.im.as_chunks::<LANES>().0);
-    for (((re, im), u), v) in re_chunks.iter().zip(im_chunks).zip(u_chunks).zip(v_chunks) {
-        for k in 0..LANES {
-            add(k, re[k], im[k], u[k], v[k]);
-        }
-    }
-    let done = re.len() - re_rest.len();
-    for k in 0..re_rest.len() {
-        add(k, re_rest[k], im_rest[k], by.re[done + k], by.im[done + k]);
-    }
-    Complex64::new(lanes_re.iter().sum(), lanes_im.iter().sum())
 }

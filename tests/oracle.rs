@@ -7,7 +7,7 @@ use cdshealpix::compass_point::MainWind::{E, NE, SE};
 use longan::contour::Field;
 use longan::moments::{Selection, Weight};
 use longan::totals::totals;
-use longan::window::windows;
+use longan::window::{Moments, Summation, windows};
 use longan::{Body, Healpix, Map, Thresholds};
 use proptest::prelude::*;
 
@@ -214,14 +214,17 @@ fn compare(case: &Case<'_>, output: usize, radius: f64) -> f64 {
         &field,
         &selection,
         out,
-        radius,
+        &[radius],
+        Summation::Exact,
         ROWS,
         |m, row| {
             row[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
             m.psi.iter().enumerate().for_each(|(i, p)| row[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
         },
         |_| (),
-    );
+    )
+    .remove(0)
+    .columns;
     let places: Vec<_> = (0..out.pixels()).map(|p| out.centre(p)).collect();
     let slow = case.windows(&places, radius);
     let mut worst: f64 = 0.0;
@@ -292,7 +295,8 @@ fn single_pixels_agree() {
         let field = Field::new(grid, &values, &thresholds, Body::Above);
         let selection = Selection { length: true, ranks: vec![3], ..Selection::default() };
         let of = |radius| {
-            windows(&field, &selection, grid, radius, 2, |m, out| out.copy_from_slice(&[m.length, m.psi[0].re]), |_| ())
+            let visit = |m: &Moments, out: &mut [f64]| out.copy_from_slice(&[m.length, m.psi[0].re]);
+            windows(&field, &selection, grid, &[radius], Summation::Exact, 2, visit, |_| ()).remove(0).columns
         };
         assert!(super::difference(&of(0.0).concat(), &of(1e-3).concat()) < 1e-14);
     }

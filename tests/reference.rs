@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use longan::formats::{self, Selection};
 use longan::measures::{BuiltIn, find};
+use longan::window::Summation;
 use longan::{Analysis, Map, ThresholdUnit, Thresholds};
 
 use super::skipped;
@@ -69,6 +70,7 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
         threshold_unit: ThresholdUnit::Value,
         nside_out: Some(nside_out),
         max_masked: 1.0,
+        summation: Summation::Exact,
         ..Analysis::default()
     };
     let column = |name: &str| &table.columns[name];

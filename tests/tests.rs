@@ -12,6 +12,8 @@ mod oracle;
 mod reference;
 /// Bodies and fields whose measures are known in closed form.
 mod shapes;
+/// Windows from prefix sums against windows summed directly.
+mod summation;
 
 use longan::Map;
 use rand::{RngExt, SeedableRng};

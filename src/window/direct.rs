@@ -1,0 +1,150 @@
+//! Windows summed pixel by pixel: exact, at a cost that grows with the window's area.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use num_complex::Complex64;
+
+use super::reach::{OutputRing, Reached};
+use super::{Band, Sums};
+use crate::moments::{Layout, RingMoments};
+use crate::transport::{Phases, Powers};
+
+/// Pixels transported at a time.
+const BLOCK: usize = 32;
+
+/// Numbers summed side by side, as many as the widest vector units hold.
+const LANES: usize = 8;
+
+/// Windows about the pixels of one quadrant of an output ring.
+///
+/// Longitudes are counted from the quadrant's own meridian, so that a field turned by 90° gives the same windows to
+/// the last bit.
+pub(super) fn sums(ring: &OutputRing, quadrant: usize, band: &Band, layout: &Layout) -> Sums {
+    let mut sums = Sums::new(ring.in_quadrant, layout.rows);
+    // Input ring by input ring, so that what neighbouring windows share is read once.
+    for reached in &ring.reached {
+        add_ring(ring, reached, 0..ring.in_quadrant, quadrant, band, layout, &mut sums);
+    }
+    sums
+}
+
+/// Adds what the windows about these pixels of an output ring's quadrant hold of one input ring.
+pub(super) fn add_ring(
+    ring: &OutputRing,
+    reached: &Reached,
+    pixels: Range<usize>,
+    quadrant: usize,
+    band: &Band,
+    layout: &Layout,
+    sums: &mut Sums,
+) {
+    let moments = band.ring(reached.number);
+    let steps = Steps::new(reached.len);
+    for k in pixels {
+        let phi = ring.phi_of(k);
+        let (from, to) = reached.span(phi);
+        let start = reached.column(from, quadrant);
+        let columns = start..start + (to - from).max(0) as usize;
+        let dphi = reached.phi_of(from) - phi;
+        let sums = sums.of(k, columns.len());
+        if columns.end <= reached.len {
+            add(moments, layout, columns, dphi, reached, &steps, sums);
+        } else {
+            // Across φ = 0: put together first, so that the sum is the same wherever the window lies.
+            let joined = moments.joined(columns.start..reached.len, 0..columns.end - reached.len);
+            add(&joined, layout, 0..columns.len(), dphi, reached, &steps, sums);
+        }
+    }
+}
+
+/// e^{iφ} for the longitudes of pixels in a ring, counted from the first.
+struct Steps {
+    steps: Phases<BLOCK>,
+    /// The same for BLOCK pixels.
+    stride: Complex64,
+}
+
+impl Steps {
+    fn new(len: usize) -> Self {
+        let mut steps = [Complex64::ONE; BLOCK];
+        steps[1] = Complex64::cis(TAU / len as f64);
+        (2..BLOCK).for_each(|k| steps[k] = steps[k / 2] * steps[k - k / 2]);
+        let stride = steps[BLOCK / 2] * steps[BLOCK / 2];
+        Steps { steps: Phases { re: steps.map(|s| s.re), im: steps.map(|s| s.im) }, stride }
+    }
+}
+
+/// Adds the moments of a range of pixels of a ring, transported; the first pixel lies `dphi` east of the centre.
+#[multiversion::multiversion(targets = "simd")]
+fn add(
+    ring: &RingMoments,
+    layout: &Layout,
+    columns: Range<usize>,
+    dphi: f64,
+    reached: &Reached,
+    steps: &Steps,
+    sums: &mut [f64],
+) {
+    for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
+        *sum += sum_of(&ring.row(row)[columns.clone()]);
+    }
+    if layout.ranks.is_empty() {
+        return;
+    }
+    let mut base = Complex64::cis(dphi);
+    for start in columns.clone().step_by(BLOCK) {
+        let mut phases = Phases::<BLOCK>::default();
+        for k in 0..BLOCK {
+            let (step_re, step_im) = (steps.steps.re[k], steps.steps.im[k]);
+            let (cos, sin) = (base.re * step_re - base.im * step_im, base.re * step_im + base.im * step_re);
+            let phase = reached.transport.phase(cos, sin);
+            (phases.re[k], phases.im[k]) = (phase.re, phase.im);
+        }
+        base *= steps.stride;
+        let block = start..(start + BLOCK).min(columns.end);
+        let mut powers = Powers::new(phases);
+        for (i, &rank) in layout.ranks.iter().enumerate() {
+            let row = layout.first_rank + 2 * i;
+            let (re, im) = (&ring.row(row)[block.clone()], &ring.row(row + 1)[block.clone()]);
+            let sum = sum_of_turned(re, im, powers.raise(rank));
+            sums[row] += sum.re;
+            sums[row + 1] += sum.im;
+        }
+    }
+}
+
+/// Sum of the values, in lanes side by side.
+#[inline(always)]
+fn sum_of(values: &[f64]) -> f64 {
+    let mut lanes = [0.0; LANES];
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    for chunk in chunks {
+        (0..LANES).for_each(|k| lanes[k] += chunk[k]);
+    }
+    (0..rest.len()).for_each(|k| lanes[k] += rest[k]);
+    lanes.iter().sum()
+}
+
+/// Sum of the complex numbers re + i im, each turned by its phase.
+#[inline(always)]
+fn sum_of_turned(re: &[f64], im: &[f64], by: &Phases<BLOCK>) -> Complex64 {
+    let (mut lanes_re, mut lanes_im) = ([0.0; LANES], [0.0; LANES]);
+    let mut add = |lane: usize, re: f64, im: f64, u: f64, v: f64| {
+        lanes_re[lane] += re * u - im * v;
+        lanes_im[lane] += re * v + im * u;
+    };
+    let (re_chunks, re_rest) = re.as_chunks::<LANES>();
+    let (im_chunks, im_rest) = im.as_chunks::<LANES>();
+    let (u_chunks, v_chunks) = (by.re.as_chunks::<LANES>().0, by.im.as_chunks::<LANES>().0);
+    for (((re, im), u), v) in re_chunks.iter().zip(im_chunks).zip(u_chunks).zip(v_chunks) {
+        for k in 0..LANES {
+            add(k, re[k], im[k], u[k], v[k]);
+        }
+    }
+    let done = re.len() - re_rest.len();
+    for k in 0..re_rest.len() {
+        add(k, re_rest[k], im_rest[k], by.re[done + k], by.im[done + k]);
+    }
+    Complex64::new(lanes_re.iter().sum(), lanes_im.iter().sum())
+}

@@ -1,0 +1,116 @@
+//! Which pixels of an input ring lie in the windows about an output ring. Both ways of summing ask here.
+
+use std::f64::consts::{PI, TAU};
+
+use longan_formats::Healpix;
+
+use crate::transport::RingTransport;
+
+/// A pixel belongs to a window whose edge its centre lies on; distances in radians within this are the same.
+const EDGE: f64 = 1e-12;
+
+/// An output ring and the input rings that windows about its pixels reach.
+#[derive(Debug)]
+pub(super) struct OutputRing {
+    /// Colatitude in radians.
+    pub(super) theta: f64,
+    /// Pixels in a quadrant of the ring; all that follows is the same in each.
+    pub(super) in_quadrant: usize,
+    /// Longitude of the first pixel and distance to the next, in radians.
+    pub(super) phi: (f64, f64),
+    /// Number of the ring.
+    pub(super) number: usize,
+    /// Input rings reached.
+    pub(super) reached: Vec<Reached>,
+}
+
+/// An input ring that windows about an output ring reach.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reached {
+    /// Number of the ring.
+    pub(super) number: usize,
+    /// Its pixels.
+    pub(super) len: usize,
+    /// Longitude of the first pixel and distance to the next, in radians.
+    pub(super) phi: (f64, f64),
+    /// Largest |Δφ| within the window, in radians; π for the whole ring.
+    pub(super) half_width: f64,
+    /// Transport from the ring to the output ring.
+    pub(super) transport: RingTransport,
+}
+
+impl OutputRing {
+    /// An output ring and what a radius (radians) reaches from it.
+    pub(super) fn new(input: Healpix, output: Healpix, number: usize, radius: f64) -> Self {
+        let centre = output.ring(number);
+        let reached = rings_within(input, output, number, radius).filter_map(|i| {
+            let ring = input.ring(i);
+            // sin²(d/2) = sin²((θ_x − θ_w)/2) + sin θ_x sin θ_w sin²(Δφ/2), free of cancellation.
+            let half = (radius + EDGE) / 2.0;
+            let beyond = half.sin().powi(2) - ((ring.theta() - centre.theta()) / 2.0).sin().powi(2);
+            let sin_sq = if half < PI / 2.0 { beyond / (ring.sin_theta * centre.sin_theta) } else { 1.0 };
+            (sin_sq >= 0.0).then(|| Reached {
+                number: i,
+                len: ring.len,
+                phi: (ring.phi(0), TAU / ring.len as f64),
+                half_width: if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI },
+                transport: RingTransport::new((ring.sin_theta, ring.cos_theta), (centre.sin_theta, centre.cos_theta)),
+            })
+        });
+        OutputRing {
+            theta: centre.theta(),
+            in_quadrant: centre.len / 4,
+            phi: (centre.phi(0), TAU / centre.len as f64),
+            number,
+            reached: if radius > 0.0 { reached.collect() } else { Vec::new() },
+        }
+    }
+
+    /// Longitude in radians of the `k`-th pixel of the first quadrant.
+    pub(super) fn phi_of(&self, k: usize) -> f64 {
+        self.phi.0 + k as f64 * self.phi.1
+    }
+}
+
+impl Reached {
+    /// The pixels from..to within the window about longitude `phi`, counted on beyond either end of the ring.
+    #[inline(always)]
+    pub(super) fn span(&self, phi: f64) -> (isize, isize) {
+        let offset = phi - self.phi.0;
+        let floor = |x: f64| (x + 4.0 * self.len as f64) as isize - 4 * self.len as isize;
+        let from = floor((offset - self.half_width) / self.phi.1) + 1;
+        let to = floor((offset + self.half_width) / self.phi.1) + 1;
+        if self.half_width < PI { (from, to.min(from + self.len as isize)) } else { (from, from + self.len as isize) }
+    }
+
+    /// Longitude in radians of a pixel, counted on beyond either end of the ring.
+    #[inline(always)]
+    pub(super) fn phi_of(&self, j: isize) -> f64 {
+        self.phi.0 + j as f64 * self.phi.1
+    }
+
+    /// The place in the ring of a pixel counted in the first quadrant, `quadrant`s further on.
+    #[inline(always)]
+    pub(super) fn column(&self, j: isize, quadrant: usize) -> usize {
+        (j + (quadrant * self.len / 4) as isize).rem_euclid(self.len as isize) as usize
+    }
+}
+
+/// The input rings that windows about an output ring may reach.
+pub(super) fn rings_within(input: Healpix, output: Healpix, ring: usize, radius: f64) -> std::ops::Range<usize> {
+    if radius == 0.0 {
+        return ring..ring + 1;
+    }
+    let theta = output.ring(ring).theta();
+    let first_south_of = |theta: f64| {
+        let (mut north, mut south) = (1, input.rings() + 1);
+        while north < south {
+            let middle = (north + south) / 2;
+            if input.ring(middle).theta() < theta { north = middle + 1 } else { south = middle }
+        }
+        north
+    };
+    // One ring more on each side: which pixels are in the window is decided for each ring.
+    let (north, south) = (first_south_of(theta - radius), first_south_of(theta + radius));
+    north.saturating_sub(1).max(1)..(south + 1).min(input.rings() + 1)
+}
