@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use longan::formats::{self, Description, Error, Field, FieldDescription, Indexing, Selection, TableDescription};
 use longan::statistics::{Statistics, statistics};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::options::{decimals, nside, print, shown};
 
@@ -29,18 +30,13 @@ enum Format {
     Json,
 }
 
-#[derive(Serialize)]
 struct Report<'a> {
     format: &'a str,
     tables: Vec<Table<'a>>,
 }
 
-#[derive(Serialize)]
 struct Table<'a> {
-    #[serde(flatten)]
     table: &'a TableDescription,
-    /// Takes the place of the description's bare fields.
-    #[serde(rename = "statistics")]
     fields: Vec<FieldReport<'a>>,
 }
 
@@ -63,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let report = report(arguments, &description)?;
     let mut out = String::new();
     match arguments.format {
-        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?,
+        Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&json_of(&report)?)?)?,
         Format::Text => write_text(&mut out, arguments, &report)?,
     }
     print(&out)
@@ -108,6 +104,15 @@ fn kind(error: Error) -> Result<&'static str, Error> {
         },
         _ => Err(error),
     }
+}
+
+fn json_of(report: &Report<'_>) -> serde_json::Result<Value> {
+    let tables = report.tables.iter().map(|Table { table, fields }| {
+        let mut json = serde_json::to_value(table)?;
+        json["fields"] = serde_json::to_value(fields)?;
+        Ok(json)
+    });
+    Ok(json!({ "format": report.format, "tables": tables.collect::<serde_json::Result<Vec<_>>>()? }))
 }
 
 fn write_text(out: &mut String, arguments: &Arguments, report: &Report<'_>) -> std::fmt::Result {

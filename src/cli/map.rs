@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// File to write; for several inputs a folder, which gets a file of the same name for each.
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
-    /// Measures, separated by commas; `longan measures` explains them all.
+    /// Measures, separated by commas, such as evq,psi2-direction; `longan measures` explains them all.
     #[arg(long, value_name = "LIST", default_value = "evq")]
     measure: Measures,
     /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside.
@@ -147,7 +147,7 @@ impl Arguments {
         let into_folder = self.inputs.len() > 1 || out.is_dir() || out.to_string_lossy().ends_with('/');
         ensure!(
             !into_folder || !out.is_file(),
-            "{}: this is a file, but the output has to be a folder here",
+            "{}: this is a file where a folder is needed; choose another name",
             shown(out)
         );
         let mut inputs = BTreeMap::new();
@@ -178,9 +178,10 @@ impl Arguments {
         }
         if self.resume {
             jobs.retain(|(_, output)| !output.is_file());
-            let finished = self.inputs.len() - jobs.len();
-            self.running
-                .say(format_args!("{finished} of {} outputs exist, and stay as they are", self.inputs.len()))?;
+            let (finished, all) = (self.inputs.len() - jobs.len(), self.inputs.len());
+            if finished > 0 {
+                self.running.say(format_args!("{finished} of {all} outputs exist, and stay as they are"))?;
+            }
         }
         for (_, output) in &jobs {
             formats::check_writable(output, self.overwrite)?;

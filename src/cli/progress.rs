@@ -12,7 +12,7 @@ impl Progress {
     /// Starts a bar with a label.
     pub(crate) fn new(label: String, quiet: bool) -> Self {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(STEPS as u64) };
-        let style = ProgressStyle::with_template("{msg} [{bar:30}] {percent}% {eta} left");
+        let style = ProgressStyle::with_template("[{bar:30}] {percent:>3}% {eta:>3} left  {wide_msg}");
         Progress(bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())).with_message(label))
     }
 

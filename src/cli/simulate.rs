@@ -122,7 +122,7 @@ impl ShapesArguments {
             }
             None => (scene(), "all shapes along the equator".to_owned()),
         };
-        let contour = text("CONTOUR", if edge == Edge::Binary { "0.5" } else { "0" }, "threshold of the outline");
+        let contour = real("CONTOUR", if edge == Edge::Binary { 0.5 } else { 0.0 }, "threshold of the outline");
         self.output.write(|grid| shapes(grid, &bodies, edge), vec![text("SHAPES", what, "bodies"), contour])
     }
 }

@@ -125,7 +125,7 @@ fn progress_is_shown_at_a_terminal_only() {
     let Some(shown) = at_a_terminal(&folder, words) else {
         return skipped("there is no `script` to run a program at a terminal, so progress bars are not tested");
     };
-    assert!(shown.contains("sky.fits [") && shown.contains('%'), "{shown:?}");
+    assert!(shown.contains("left  sky.fits") && shown.contains('%'), "{shown:?}");
     assert!(!std::fs::read_to_string(folder.path("printed")).unwrap().contains('['));
     assert_eq!(at_a_terminal(&folder, &format!("{words} --quiet")).as_deref(), Some(""));
 }

@@ -267,7 +267,7 @@ fn outputs_that_may_not_be_written() {
     folder.refused("map sky.fits -o folder", &["folder/sky.fits: ", "is a folder"]);
     folder.refused("simulate waves -o folder", &["folder: ", "is a folder"]);
     folder.refused("map sky.fits -o old.fits/", &["old.fits"]);
-    folder.refused("map sky.fits same.fits -o old.fits", &["old.fits", "is a file", "folder"]);
+    folder.refused("map sky.fits same.fits -o old.fits", &["old.fits", "is a file where a folder is needed"]);
     folder.refused("map sky.fits ./sky.fits -o new", &["sky.fits", "./sky.fits", "both", "new/sky.fits"]);
     folder.refused("map .. -o folder", &["..: ", "not a file"]);
     folder.refused("demo old.fits", &["old.fits: ", "folder"]);

@@ -98,17 +98,17 @@ fn info_says_what_it_sees() {
 
     let report = json(&folder.done("info two.fits --format json"));
     let table = &report["tables"][0];
-    let field = &table["statistics"][0];
+    let field = &table["fields"][0];
     assert_eq!((&table["nside"], &table["ordering"]), (&Value::from(2), &Value::from("NESTED")));
     assert_eq!((&field["name"], &field["unit"], &field["max"]), (&"TEMPERATURE".into(), &"mK".into(), &47.0.into()));
     assert_eq!(field["masked_fraction"].as_f64(), Some(0.25));
-    assert_eq!(table["statistics"][1]["not_a_map"], "text");
-    assert_eq!(report["tables"][1]["statistics"][0]["masked_fraction"].as_f64(), Some(2.0 / 3.0));
+    assert_eq!(table["fields"][1]["not_a_map"], "text");
+    assert_eq!(report["tables"][1]["fields"][0]["masked_fraction"].as_f64(), Some(2.0 / 3.0));
 
     // Nothing at all.
     folder.write("nothing.fits", &map_file(&[f64::NAN; 12], &[]));
     assert!(folder.done("info nothing.fits").contains("100.000%"));
-    assert!(json(&folder.done("info nothing.fits --format json"))["tables"][0]["statistics"][0]["mean"].is_null());
+    assert!(json(&folder.done("info nothing.fits --format json"))["tables"][0]["fields"][0]["mean"].is_null());
 
     // Cells too fine to be expanded unasked: one cell of order 20 among large ones.
     let cells = file(2, &[col("UNIQ", "K", bytes::i64s(&[4, 4i64.pow(21) * 2])), column("P", &[1.0, 2.0])], &[]);
@@ -148,7 +148,7 @@ fn simulated_maps() {
     // Seven bodies; a cap of 10 degrees' radius about its centre.
     let euler = |words: &str| rows(&folder.done(&format!("totals {words} --format csv")))[0].1;
     folder.done("simulate shapes -o smooth.fits --nside 64 --edge smooth");
-    assert_eq!(header("smooth.fits")["CONTOUR"], "0");
+    assert_eq!(header("smooth.fits")["CONTOUR"], "0.0");
     assert_eq!(euler("smooth.fits --thresholds 0"), Some(7));
     let cap = rows(&folder.done("totals cap.fits --format csv --thresholds 0"));
     let area = std::f64::consts::TAU * (1.0 - 10f64.to_radians().cos());

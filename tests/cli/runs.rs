@@ -59,7 +59,8 @@ fn one_bad_input_does_not_stop_the_others() {
 fn a_run_is_resumed() {
     let folder = Folder::with_sky();
     std::fs::copy(folder.path("sky.fits"), folder.path("more.fits")).unwrap();
-    folder.done("map sky.fits -o maps/");
+    let printed = folder.done("map sky.fits -o maps/ --resume");
+    assert!(printed.starts_with("maps/sky.fits: EVQ"), "{printed}");
     let before = written(&folder, "maps/sky.fits");
     let printed = folder.done("map sky.fits more.fits -o maps --resume");
     assert!(printed.starts_with("1 of 2 outputs exist, and stay as they are\nmaps/more.fits: EVQ"), "{printed}");
