@@ -100,13 +100,13 @@ pub enum AnalysisError {
     /// Nothing to look at.
     #[error("every pixel of the map is masked")]
     AllMasked,
-    /// Thresholds in σ of a field that has none.
+    /// Thresholds in σ of a field that has none, or too little to tell them apart.
     #[error(
-        "the unmasked pixels all have the value {value}, so thresholds cannot be counted in standard deviations; give them in the map's unit"
+        "the unmasked pixels vary too little about {mean:e} for thresholds in standard deviations; give thresholds in the map's unit"
     )]
     Constant {
-        /// The value.
-        value: f64,
+        /// The mean.
+        mean: f64,
     },
     /// Values too large for a mean.
     #[error(
@@ -166,9 +166,12 @@ impl Analysis {
                 return Err(AnalysisError::NotFinite);
             }
             ThresholdUnit::Sigma if of_map.sigma == 0.0 => {
-                return Err(AnalysisError::Constant { value: of_map.mean });
+                return Err(AnalysisError::Constant { mean: of_map.mean });
             }
-            ThresholdUnit::Sigma => self.thresholds.in_units_of(of_map.mean, of_map.sigma)?,
+            ThresholdUnit::Sigma => match self.thresholds.in_units_of(of_map.mean, of_map.sigma) {
+                Err(ThresholdError::Repeated { .. }) => return Err(AnalysisError::Constant { mean: of_map.mean }),
+                thresholds => thresholds?,
+            },
         };
         Ok((thresholds, of_map))
     }

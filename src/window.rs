@@ -1,8 +1,8 @@
 //! Moments of moving windows: pixels within a radius of an output pixel, transported to its centre and summed.
 //!
 //! Works from north to south, holding pixel moments only for the rings that the windows of the present output rings
-//! reach. The sum over a window's pixels is taken one by one ([`direct`]), or ring by ring from prefix sums
-//! ([`prefix`]), whichever costs less. What a window's moments mean is left to whoever visits them.
+//! reach. The sum over a window's pixels is taken one by one (`direct`), or ring by ring from prefix sums
+//! (`prefix`), whichever costs less. What a window's moments mean is left to whoever visits them.
 
 mod direct;
 mod prefix;
@@ -47,6 +47,8 @@ pub enum Summation {
     /// From prefix sums wherever that costs less and the phases of transport are met to this accuracy: then ψ_s is
     /// off by at most this share of the window's W1. Areas, lengths, curvatures and masked fractions stay exact.
     Tolerance(f64),
+    /// The same, from prefix sums wherever that is accurate enough, whatever it costs.
+    Prefix(f64),
 }
 
 impl Default for Summation {

@@ -51,7 +51,7 @@ fn prefix_sums_keep_their_tolerance() {
                 let run = |summation| moments(&map, &[2.0, 4.5], output, radius, summation, Weight::Length);
                 let (exact, _) = run(Summation::Exact);
                 for tolerance in [1e-5, 1e-9] {
-                    let (fast, ways) = run(Summation::Tolerance(tolerance));
+                    let (fast, ways) = run(Summation::Prefix(tolerance));
                     from_prefix_sums += ways.prefix;
                     assert!(ways.error <= tolerance);
                     for p in 0..exact[0].len() {

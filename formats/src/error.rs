@@ -333,7 +333,7 @@ pub enum Error {
     },
 
     /// A file that is not to be replaced.
-    #[error("the file exists; choose another name or allow overwriting")]
+    #[error("the file exists; choose another name, or overwrite it with --overwrite")]
     Exists,
     /// A folder that is not there.
     #[error("the folder {} does not exist; create it first", shown(folder))]

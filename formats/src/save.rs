@@ -78,5 +78,6 @@ fn folder_of(path: &Path) -> &Path {
 
 fn temporary_folder(to: &Path) -> Result<TempDir, Error> {
     let made = tempfile::Builder::new().prefix(".longan-").tempdir_in(folder_of(to));
-    made.map_err(|cause| Error::Io { action: "write to its folder", cause })
+    // Without the temporary folder's own name, which tells a user nothing.
+    made.map_err(|cause| Error::Io { action: "write to its folder", cause: cause.kind().into() })
 }

@@ -106,10 +106,11 @@ pub struct UnknownMeasure {
 /// [`UnknownMeasure`], with the nearest name.
 pub fn find(name: &str) -> Result<BuiltIn, UnknownMeasure> {
     BUILT_INS.iter().find_map(|&kind| named(kind, name)).ok_or_else(|| {
-        let rank: String = name.chars().filter(char::is_ascii_digit).collect();
+        let digits: String = name.chars().filter(char::is_ascii_digit).collect();
+        let rank = digits.parse().ok().filter(|&rank: &u32| rank > 0).unwrap_or(2).to_string();
         let nearest = BUILT_INS
             .iter()
-            .map(|kind| kind.pattern.replace('N', if rank.is_empty() { "2" } else { &rank }))
+            .map(|kind| kind.pattern.replace('N', &rank))
             .map(|known| (strsim::damerau_levenshtein(&known, name), known))
             .min()
             .filter(|(distance, known)| 2 * distance <= known.len())
@@ -146,6 +147,8 @@ mod tests {
         let nearest = |name: &str| find(name).unwrap_err().nearest;
         assert_eq!(nearest("evk").as_deref(), Some("evq"));
         assert_eq!(nearest("psi3-directon").as_deref(), Some("psi3-direction"));
+        assert_eq!(nearest("psi0").as_deref(), Some("psi2"));
+        assert_eq!(nearest("psi03").as_deref(), Some("psi3"));
         for name in ["psi0", "psi", "psi-1", "psi02", "psi99999999999", "EVQ", "", "psi2x", "psiN"] {
             assert!(find(name).is_err(), "{name}");
         }

@@ -11,6 +11,7 @@ use clap::{Args, ValueEnum};
 use longan::formats::{self, Healpix, Map, Ordering};
 use longan::measures::{BuiltIn, Measure, find};
 use longan::statistics::statistics;
+use longan::window::Summation;
 use longan::{Analysis, Weight};
 
 use super::options::{BodyOptions, Input, Running, between, check_memory, decimals, nside, shown};
@@ -58,6 +59,14 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SHARE", default_value_t = 0.0625)]
     #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 1.0))]
     max_masked: f64,
+    /// Largest error of psi_s, as a share of the window's contour length, where many and large windows are summed
+    /// from prefix sums; areas, lengths and curvatures are exact always.
+    #[arg(long, value_name = "X", default_value_t = 1e-7)]
+    #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 1e-12, 0.1))]
+    tolerance: f64,
+    /// Sum every window pixel by pixel, however long it takes.
+    #[arg(long, conflicts_with = "tolerance")]
+    exact: bool,
     #[command(flatten)]
     body: BodyOptions,
     #[command(flatten)]
@@ -198,6 +207,7 @@ impl Arguments {
             },
             nside_out: self.nside_out,
             max_masked: self.max_masked,
+            summation: if self.exact { Summation::Exact } else { Summation::Tolerance(self.tolerance) },
             ..self.body.analysis()
         }
     }

@@ -97,6 +97,7 @@ impl Provenance<'_> {
             real("INMEAN", maps.of_map.mean, "mean of the unmasked pixels"),
             real("INSIGMA", maps.of_map.sigma, "their standard deviation"),
             real("WINDOW", analysis.window, "[deg] radius of the window, 0: the pixel itself"),
+            real("PSIERROR", maps.ways.error, "largest error of psi_s over W1, 0: summed pixel by pixel"),
             real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
             text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
             text(

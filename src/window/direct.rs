@@ -41,19 +41,30 @@ pub(super) fn add_ring(
 ) {
     let moments = band.ring(reached.number);
     let steps = Steps::new(reached.len);
-    for k in pixels {
+    // Where the input ring's pixels lie in the same way about each output pixel, their phases are the same.
+    let alike = reached.len.is_multiple_of(4 * ring.in_quadrant).then(|| reached.len / (4 * ring.in_quadrant));
+    let (from_first, to_first) = reached.span(ring.phi_of(0));
+    let mut turns = Vec::new();
+    for k in pixels.clone() {
         let phi = ring.phi_of(k);
-        let (from, to) = reached.span(phi);
+        let (from, to) = match alike {
+            Some(pixels) => (from_first + (k * pixels) as isize, to_first + (k * pixels) as isize),
+            None => reached.span(phi),
+        };
         let start = reached.column(from, quadrant);
         let columns = start..start + (to - from).max(0) as usize;
-        let dphi = reached.phi_of(from) - phi;
+        if alike.is_none() || k == pixels.start {
+            let dphi =
+                if alike.is_some() { reached.phi_of(from_first) - ring.phi_of(0) } else { reached.phi_of(from) - phi };
+            find_turns(columns.len(), layout, dphi, reached, &steps, &mut turns);
+        }
         let sums = sums.of(k, columns.len());
         if columns.end <= reached.len {
-            add(moments, layout, columns, dphi, reached, &steps, sums);
+            add(moments, layout, columns, &turns, sums);
         } else {
             // Across φ = 0: put together first, so that the sum is the same wherever the window lies.
             let joined = moments.joined(columns.start..reached.len, 0..columns.end - reached.len);
-            add(&joined, layout, 0..columns.len(), dphi, reached, &steps, sums);
+            add(&joined, layout, 0..columns.len(), &turns, sums);
         }
     }
 }
@@ -75,25 +86,23 @@ impl Steps {
     }
 }
 
-/// Adds the moments of a range of pixels of a ring, transported; the first pixel lies `dphi` east of the centre.
+/// Phases of transport from so many consecutive pixels, the first of which lies `dphi` east of the centre: for each block
+/// of pixels those of each rank.
 #[multiversion::multiversion(targets = "simd")]
-fn add(
-    ring: &RingMoments,
+fn find_turns(
+    pixels: usize,
     layout: &Layout,
-    columns: Range<usize>,
     dphi: f64,
     reached: &Reached,
     steps: &Steps,
-    sums: &mut [f64],
+    turns: &mut Vec<Phases<BLOCK>>,
 ) {
-    for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
-        *sum += sum_of(&ring.row(row)[columns.clone()]);
-    }
+    turns.clear();
     if layout.ranks.is_empty() {
         return;
     }
     let mut base = Complex64::cis(dphi);
-    for start in columns.clone().step_by(BLOCK) {
+    for _ in 0..pixels.div_ceil(BLOCK) {
         let mut phases = Phases::<BLOCK>::default();
         for k in 0..BLOCK {
             let (step_re, step_im) = (steps.steps.re[k], steps.steps.im[k]);
@@ -102,15 +111,27 @@ fn add(
             (phases.re[k], phases.im[k]) = (phase.re, phase.im);
         }
         base *= steps.stride;
-        let block = start..(start + BLOCK).min(columns.end);
         let mut powers = Powers::new(phases);
-        for (i, &rank) in layout.ranks.iter().enumerate() {
-            let row = layout.first_rank + 2 * i;
-            let (re, im) = (&ring.row(row)[block.clone()], &ring.row(row + 1)[block.clone()]);
-            let sum = sum_of_turned(re, im, powers.raise(rank));
-            sums[row] += sum.re;
-            sums[row + 1] += sum.im;
+        turns.extend(layout.ranks.iter().map(|&rank| *powers.raise(rank)));
+    }
+}
+
+/// Adds the moments of a range of pixels of a ring, each turned by its phase.
+#[multiversion::multiversion(targets = "simd")]
+fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, turns: &[Phases<BLOCK>], sums: &mut [f64]) {
+    for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
+        *sum += sum_of(&ring.row(row)[columns.clone()]);
+    }
+    let ranks = layout.ranks.len();
+    for rank in 0..ranks {
+        let row = layout.first_rank + 2 * rank;
+        let (re, im) = (&ring.row(row)[columns.clone()], &ring.row(row + 1)[columns.clone()]);
+        let mut sum = Complex64::ZERO;
+        for (block, (re, im)) in re.chunks(BLOCK).zip(im.chunks(BLOCK)).enumerate() {
+            sum += sum_of_turned(re, im, &turns[block * ranks + rank]);
         }
+        sums[row] += sum.re;
+        sums[row + 1] += sum.im;
     }
 }
 

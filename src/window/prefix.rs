@@ -74,8 +74,10 @@ struct Node {
 
 /// Divides rings into groups and finds the cheaper way for each.
 pub(super) fn groups(rings: &[OutputRing], layout: &Layout, radius: f64, summation: Summation) -> Vec<Group> {
-    let Summation::Tolerance(tolerance) = summation else {
-        return (0..rings.len()).map(|i| Group { rings: i..i + 1, plan: None }).collect();
+    let (tolerance, worthwhile) = match summation {
+        Summation::Exact => return (0..rings.len()).map(|i| Group { rings: i..i + 1, plan: None }).collect(),
+        Summation::Tolerance(tolerance) => (tolerance, WORTHWHILE),
+        Summation::Prefix(tolerance) => (tolerance, f64::INFINITY),
     };
     // Groups no higher than the window's radius: their phases differ little more than those of one ring.
     let mut groups = Vec::new();
@@ -84,7 +86,9 @@ pub(super) fn groups(rings: &[OutputRing], layout: &Layout, radius: f64, summati
         let full = end - start == GROUP || end == rings.len() || rings[end].theta - rings[start].theta > radius;
         if full {
             let plan = Plan::new(&rings[start..end], layout, tolerance);
-            match plan.filter(|plan| plan.cost(&rings[start..end]) < WORTHWHILE * direct_cost(&rings[start..end], layout)) {
+            match plan
+                .filter(|plan| plan.cost(&rings[start..end]) < worthwhile * direct_cost(&rings[start..end], layout))
+            {
                 Some(plan) => groups.push(Group { rings: start..end, plan: Some(plan) }),
                 None => groups.extend((start..end).map(|i| Group { rings: i..i + 1, plan: None })),
             }
@@ -356,7 +360,7 @@ fn fill(
 ) {
     let moments = band.ring(ring.number);
     let lanes = plan.width / LANES;
-    let plain = layout.first_rank.next_multiple_of(LANES) / LANES;
+    let plain = layout.first_rank.div_ceil(LANES);
     prefix.clear();
     prefix.resize((stretch.len() + 1) * lanes, [0.0; LANES]);
     // e^{i m_k (φ − middle)} and its step from pixel to pixel, for each rank: real parts, then imaginary parts.
