@@ -46,7 +46,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEG", default_value_t = 6.0)]
     #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
     window: f64,
-    /// Nside of the output [default: the smaller of 16 and the input's].
+    /// Nside of the output [default: the smaller of 16 and the input's; for --window 0 the input's].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
     nside_out: Option<usize>,
     /// Weight of the contour's pieces in tensors: their length (W_1) or their curvature (W_2).
