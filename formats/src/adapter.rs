@@ -21,6 +21,7 @@ pub enum Field {
     /// By its name, in any case.
     Name(String),
     /// By its place among the data columns from 0, as healpy counts; a column of pixel numbers is not counted.
+    /// In a sparse table (Fermi's cubes) the plane.
     Number(usize),
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::multi_order;
 use super::table::{self, Column, Kind, Layout, Table};
 use crate::cfitsio::FitsReader;
-use crate::{Error, Healpix, Map, Ordering, Selection, UNSEEN, is_bad};
+use crate::{Error, Field, Healpix, Map, Ordering, Selection, UNSEEN, is_bad};
 
 /// Values per call to cfitsio: many enough that calls cost nothing, few enough to stay in the cache.
 pub(super) const CHUNK: usize = 1 << 17;
@@ -20,7 +20,7 @@ pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) 
     }
     let canvas = match &table.layout {
         Layout::Implicit { named } => implicit(fits, table, column, *named)?,
-        Layout::Explicit { index, grain } => explicit(fits, table, column, index, *grain)?,
+        Layout::Explicit { index, grain } => explicit(fits, table, column, (index, *grain), plane(table, selection))?,
         Layout::MultiOrder { index } => multi_order::read(fits, table, column, index, selection.nside)?,
     };
     let mut map = Map::from_masked(canvas.grid, canvas.values);
@@ -29,6 +29,14 @@ pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) 
     map.coordinates = table.coordinates;
     map.ordering = table.ordering;
     Ok(map)
+}
+
+/// The plane (energy band) of a sparse table that a field's number names, the first unless given.
+fn plane(table: &Table, selection: &Selection) -> Option<usize> {
+    table.sparse.then_some(match selection.field {
+        Some(Field::Number(number)) => number,
+        _ => 0,
+    })
 }
 
 /// A map under construction: values come in the file's ordering and are put where RING order has them.
@@ -110,8 +118,8 @@ fn explicit(
     fits: &mut FitsReader,
     table: &Table,
     column: &Column,
-    index: &Column,
-    grain: usize,
+    (index, grain): (&Column, usize),
+    plane: Option<usize>,
 ) -> Result<Canvas, Error> {
     let grid = table.explicit_grid(index)?;
     let run = table.run(column, index, grain)?;
@@ -127,6 +135,16 @@ fn explicit(
         read_integers(fits, table, index, start, &mut indices)?;
         read_values(fits, table, column, start * run, &mut values)?;
         places.clear();
+        if let Some(plane) = plane {
+            // Of a sparse table's planes, this one; a key is plane · Npix + pixel.
+            let pixels = grid.pixels() as i128;
+            let wanted: Vec<bool> = indices.iter().map(|key| key.div_euclid(pixels) == plane as i128).collect();
+            let mut of_value = wanted.iter().flat_map(|&wanted| std::iter::repeat_n(wanted, run));
+            values.retain(|_| of_value.next() == Some(true));
+            let mut of_index = wanted.iter();
+            indices.retain(|_| of_index.next() == Some(&true));
+            indices.iter_mut().for_each(|key| *key = key.rem_euclid(pixels));
+        }
         for &first in &indices {
             for pixel in first..first + run as i128 {
                 let Some(p) = usize::try_from(pixel).ok().filter(|&p| p < grid.pixels()) else {

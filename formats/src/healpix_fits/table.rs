@@ -18,6 +18,8 @@ pub(super) struct Table {
     /// The data columns.
     pub(super) columns: Vec<Column>,
     pub(super) layout: Layout,
+    /// Whether it holds the planes of a cube, told apart by the index (Fermi's SPARSE).
+    pub(super) sparse: bool,
     /// The grid, where there is a keyword for it.
     grid: Option<Healpix>,
     pub(super) ordering: Ordering,
@@ -80,6 +82,9 @@ pub(super) enum Likeness {
 const INDEX_NAMES: [&str; 9] =
     ["PIXEL", "PIXELS", "PIX", "IPIX", "HPIX", "HPXINDEX", "HPX_INDEX", "PIXEL_INDEX", "INDEX"];
 
+/// Names of the column of a sparse table that counts pixels on through its planes.
+const KEY_NAMES: [&str; 2] = ["KEY", "IDX"];
+
 /// Name of the column of cell numbers in multi-order tables.
 const UNIQ: &str = "UNIQ";
 
@@ -139,8 +144,12 @@ impl Table {
                 let index = named(&INDEX_NAMES).or_else(first_integer);
                 (Some(index.ok_or(Error::NoIndexColumn { hdu })?), false)
             }
+            (None, Some("SPARSE")) => {
+                let index = named(&KEY_NAMES).or_else(|| named(&INDEX_NAMES)).or_else(first_integer);
+                (Some(index.ok_or(Error::NoIndexColumn { hdu })?), false)
+            }
             (None, None) => (named(&INDEX_NAMES), false),
-            (None, Some(scheme)) => return Err(bad_key(hdu, "INDXSCHM", scheme, "IMPLICIT or EXPLICIT")),
+            (None, Some(scheme)) => return Err(bad_key(hdu, "INDXSCHM", scheme, "IMPLICIT, EXPLICIT or SPARSE")),
         };
         let index = index.map(|i| columns.remove(i));
         if rows == 0 || columns.is_empty() {
@@ -166,6 +175,7 @@ impl Table {
             rows,
             columns,
             layout,
+            sparse: scheme.as_deref() == Some("SPARSE"),
             grid,
             ordering: if uniq { Ordering::Nested } else { ordering },
             ordering_assumed: ordering_assumed && !uniq,
@@ -217,6 +227,8 @@ impl Table {
         let column = match field {
             None => self.columns.first(),
             Some(Field::Name(name)) => by_name(name),
+            // Here a number names a plane.
+            Some(Field::Number(_)) if self.sparse => self.columns.first(),
             Some(Field::Number(number)) => self.columns.get(*number).or_else(|| by_name(&number.to_string())),
         };
         let column = column.ok_or_else(|| Error::UnknownField {

@@ -96,7 +96,7 @@ fn keywords_that_are_wrong_but_not_needed() {
 
 #[test]
 fn an_unknown_indexing() {
-    let (error, told) = problem_with(&with_keys(&[("INDXSCHM", "'SPARSE'")]), &Selection::default());
+    let (error, told) = problem_with(&with_keys(&[("INDXSCHM", "'STRANGE'")]), &Selection::default());
     assert!(matches!(&error, Error::Keyword { key, .. } if key == "INDXSCHM"), "{told}");
     let (error, _) = problem_with(&with_keys(&[("INDXSCHM", "'EXPLICIT'"), ("NSIDE", "2")]), &Selection::default());
     assert!(matches!(error, Error::NoIndexColumn { hdu: 1 }));

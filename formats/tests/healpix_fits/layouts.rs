@@ -233,6 +233,25 @@ fn half() -> (Vec<i64>, Vec<f64>, Vec<f64>) {
 }
 
 #[test]
+fn planes_of_a_sparse_table() {
+    // Plane 0 holds every second pixel, plane 1 the same shifted by one and all of value 5.
+    let (pixels, values, expected) = half();
+    let keys: Vec<i64> = pixels.iter().copied().chain(pixels.iter().map(|p| 48 + p + 1)).collect();
+    let both: Vec<f64> = values.iter().copied().chain([5.0; 24]).collect();
+    let sparse = with(RING, &[("INDXSCHM", "'SPARSE'")]);
+    for (rows, key_form, value_form) in [(48, "K", "D"), (1, "48K", "48D")] {
+        for name in ["KEY", "IDX", "PIX"] {
+            let columns = [col(name, key_form, i64s(&keys)), col("VALUE", value_form, f64s(&both))];
+            let bytes = file(rows, &columns, &sparse);
+            assert_same(read(&bytes).unwrap().values(), &expected);
+            let other = read_with(&bytes, &field("1")).unwrap();
+            let odd: Vec<f64> = (0..48).map(|p| if p % 2 == 1 { 5.0 } else { f64::NAN }).collect();
+            assert_same(other.values(), &odd);
+        }
+    }
+}
+
+#[test]
 fn pixels_named_by_an_index_column() {
     let (pixels, values, expected) = half();
     let explicit = with(RING, &[("INDXSCHM", "'EXPLICIT'"), ("OBJECT", "'PARTIAL'")]);
