@@ -38,7 +38,7 @@ fn files_that_are_no_maps() {
         ("word.fits", map_file(&values(), &[("NSIDE", "'four'")]), &["NSIDE = four", "whole number"]),
         ("three.fits", map_file(&[1.0; 108], &[("NSIDE", "3"), ("ORDERING", "'NESTED'")]), &["Nside 3", "use RING"]),
         ("ordering.fits", key("ORDERING", "'SPIRAL'"), &["ORDERING = SPIRAL", "RING, NESTED"]),
-        ("indexing.fits", key("INDXSCHM", "'SPIRAL'"), &["INDXSCHM = SPIRAL", "IMPLICIT or EXPLICIT"]),
+        ("indexing.fits", key("INDXSCHM", "'SPIRAL'"), &["INDXSCHM = SPIRAL", "IMPLICIT, EXPLICIT or SPARSE"]),
         ("unindexed.fits", key("INDXSCHM", "'EXPLICIT'"), &["no column of integers"]),
         ("names.fits", text(192), &["column 'NAMES'", "is text", "choose another field"]),
         ("rowless.fits", text(0), &["holds no data"]),
