@@ -6,7 +6,7 @@
 //!
 //! Everything follows from RING order in closed form, for any Nside and without neighbour tables. A ring repeats
 //! itself: `sectors` times the same cells, turned about the pole (four times in the polar caps, once a pixel in the
-//! equatorial belt). So a [`Stencil`], the corners and the geometry of one cell in the first sector, serves all.
+//! equatorial belt). So a [`Stencil`], the corners of one cell in the first sector, and its [`Geometry`] serve all.
 //! What is done with cells is left to [`crate::contour`].
 
 use std::f64::consts::PI;

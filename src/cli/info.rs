@@ -3,13 +3,13 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use longan::formats::{self, Description, Error, Field, FieldDescription, Indexing, Selection, TableDescription};
 use longan::statistics::{Statistics, statistics};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::options::{decimals, nside, print, shown};
+use super::options::{Format, decimals, nside, print, shown};
 
 /// What a file holds: Nside, ordering, coordinate system, and each field's unit, range and masked fraction.
 #[derive(Args, Debug)]
@@ -22,12 +22,6 @@ pub(crate) struct Arguments {
     /// How to print.
     #[arg(long, value_name = "FORMAT", default_value = "text")]
     format: Format,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Format {
-    Text,
-    Json,
 }
 
 struct Report<'a> {

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use longan::measures::BUILT_INS;
 use serde::Serialize;
 
-use super::options::print;
+use super::options::{Format, print};
 
 /// Every measure, with its definition, unit and rank; N stands for any rank from 1.
 #[derive(Args, Debug)]
@@ -14,12 +14,6 @@ pub(crate) struct Arguments {
     /// How to print.
     #[arg(long, value_name = "FORMAT", default_value = "text")]
     format: Format,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Format {
-    Text,
-    Json,
 }
 
 #[derive(Serialize)]

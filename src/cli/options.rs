@@ -90,6 +90,13 @@ impl BodyOptions {
     }
 }
 
+/// How reports are printed: for people, or for programs.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Format {
+    Text,
+    Json,
+}
+
 /// Sides of a threshold.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum BodyOption {
