@@ -8,7 +8,7 @@ use longan::{Analysis, Healpix};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let field = Waves::new(4.0, 1)?.map(Healpix::new(128)?);
-    let maps = Analysis::default().minkowski_maps(&field, &[find("evq")?, find("evq-direction")?], |_| ())?;
+    let maps = Analysis::default().minkowski_maps(&field, &[find("evq")?, find("evq-direction")?], |_| ())?.remove(0);
 
     let (evq, direction) = (&maps.values[0], &maps.values[1]);
     let most = (0..evq.len()).filter(|&p| !evq[p].is_nan()).max_by(|&a, &b| evq[a].total_cmp(&evq[b]));

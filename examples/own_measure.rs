@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let field = Waves::new(6.0, 2)?.map(Healpix::new(64)?);
     let measures: [Box<dyn Measure>; 1] = [Box::new(ShapeIndex)];
-    let maps = Analysis::default().minkowski_maps(&field, &measures, |_| ())?;
+    let maps = Analysis::default().minkowski_maps(&field, &measures, |_| ())?.remove(0);
     let values: Vec<f64> = maps.values[0].iter().copied().filter(|v| !v.is_nan()).collect();
     println!("mean shape index in {} windows: {:.3}", values.len(), values.iter().sum::<f64>() / values.len() as f64);
     Ok(())

@@ -13,7 +13,7 @@ use crate::moments::{Selection, Weight};
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
 use crate::totals::{Totals, totals};
-use crate::window::{Moments, Summation, Ways, Windows, windows};
+use crate::window::{Moments, MovingWindows, Summation, Ways, Windows};
 
 /// What thresholds are counted in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,8 +28,8 @@ pub enum ThresholdUnit {
 /// How a field is analysed. The default is the analysis of the paper.
 #[derive(Clone, Debug)]
 pub struct Analysis {
-    /// Radius of the window in degrees, up to 180; 0: each pixel by itself.
-    pub window: f64,
+    /// Radii of the windows in degrees, up to 180; 0: each pixel by itself.
+    pub windows: Vec<f64>,
     /// Thresholds, averaged over.
     pub thresholds: Thresholds,
     /// What they are counted in.
@@ -38,7 +38,7 @@ pub struct Analysis {
     pub body: Body,
     /// What the contour's pieces weigh in the moments ψ_s.
     pub weight: Weight,
-    /// Nside of the result; default: the smaller of 16 and the field's, or the field's where the window is 0.
+    /// Nside of the result; default: the smaller of 16 and the field's, or the field's where a window is 0.
     pub nside_out: Option<usize>,
     /// Windows with a larger share of masked cells are masked.
     pub max_masked: f64,
@@ -49,7 +49,7 @@ pub struct Analysis {
 impl Default for Analysis {
     fn default() -> Self {
         Analysis {
-            window: 6.0,
+            windows: vec![6.0],
             thresholds: Thresholds::standard(),
             threshold_unit: ThresholdUnit::Sigma,
             body: Body::Above,
@@ -79,6 +79,15 @@ pub enum AnalysisError {
     MaxMasked {
         /// The share.
         share: f64,
+    },
+    /// No window.
+    #[error("no window is asked for")]
+    NoWindow,
+    /// A window asked for twice.
+    #[error("the window of {degrees} degrees is asked for twice")]
+    Repeated {
+        /// The radius.
+        degrees: f64,
     },
     /// Nothing to compute.
     #[error("no measure is asked for")]
@@ -118,11 +127,13 @@ pub enum AnalysisError {
     Thresholds(#[from] ThresholdError),
 }
 
-/// Minkowski maps of one field: one array a measure.
+/// Minkowski maps of one field for one window: one array a measure.
 #[derive(Clone, Debug)]
 pub struct MinkowskiMaps {
     /// The grid of the maps.
     pub grid: Healpix,
+    /// Radius of the window in degrees.
+    pub window: f64,
     /// The thresholds, in the field's unit, of which these are the mean.
     pub thresholds: Thresholds,
     /// Statistics of the field analysed.
@@ -139,16 +150,25 @@ impl Analysis {
     /// # Errors
     /// What is out of range.
     pub fn check(&self, map: Healpix) -> Result<Healpix, AnalysisError> {
-        if !(0.0..=180.0).contains(&self.window) {
-            return Err(AnalysisError::Window { degrees: self.window });
+        for (i, &degrees) in self.windows.iter().enumerate() {
+            if !(0.0..=180.0).contains(&degrees) {
+                return Err(AnalysisError::Window { degrees });
+            }
+            if self.windows[..i].contains(&degrees) {
+                return Err(AnalysisError::Repeated { degrees });
+            }
+        }
+        if self.windows.is_empty() {
+            return Err(AnalysisError::NoWindow);
         }
         if !(0.0..=1.0).contains(&self.max_masked) {
             return Err(AnalysisError::MaxMasked { share: self.max_masked });
         }
-        let default = if self.window == 0.0 { map.nside() } else { map.nside().min(DEFAULT_NSIDE_OUT) };
+        let of_pixels = self.windows.contains(&0.0);
+        let default = if of_pixels { map.nside() } else { map.nside().min(DEFAULT_NSIDE_OUT) };
         let nside = self.nside_out.unwrap_or(default);
         let output = Healpix::new(nside).map_err(|_| AnalysisError::NsideOut { nside })?;
-        if self.window == 0.0 && output != map {
+        if of_pixels && output != map {
             return Err(AnalysisError::PixelWindow { map: map.nside(), output: nside });
         }
         Ok(output)
@@ -176,7 +196,7 @@ impl Analysis {
         Ok((thresholds, of_map))
     }
 
-    /// Minkowski maps: each measure in windows about all pixels of the output grid, averaged over the thresholds.
+    /// Minkowski maps, for each window: each measure about all pixels of the output grid, averaged over the thresholds.
     ///
     /// `progress` is told the share done, from 0 to 1. The result does not depend on the number of threads.
     ///
@@ -187,13 +207,13 @@ impl Analysis {
         map: &Map,
         measures: &[impl AsRef<dyn Measure> + Sync],
         progress: impl FnMut(f64),
-    ) -> Result<MinkowskiMaps, AnalysisError> {
-        self.check(map.grid())?;
+    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
+        let grid = self.check(map.grid())?;
         let (thresholds, of_map) = self.thresholds_of(map)?;
-        self.at(thresholds, of_map, map, measures, progress)
+        self.at(thresholds, of_map, map, grid, measures, progress)
     }
 
-    /// The same for every threshold by itself, in ascending order.
+    /// The same for every threshold by itself: for each window the thresholds in ascending order.
     ///
     /// # Errors
     /// As [`minkowski_maps`](Self::minkowski_maps).
@@ -203,14 +223,18 @@ impl Analysis {
         measures: &[impl AsRef<dyn Measure> + Sync],
         mut progress: impl FnMut(f64),
     ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
-        self.check(map.grid())?;
+        let grid = self.check(map.grid())?;
         let (thresholds, of_map) = self.thresholds_of(map)?;
         let count = thresholds.values().len() as f64;
-        let each = |(i, &threshold): (usize, &f64)| {
+        let mut all = Vec::new();
+        for (i, &threshold) in thresholds.values().iter().enumerate() {
             let alone = Thresholds::new(vec![threshold])?;
-            self.at(alone, of_map, map, measures, |share| progress((i as f64 + share) / count))
-        };
-        thresholds.values().iter().enumerate().map(each).collect()
+            let progress = |share| progress((i as f64 + share) / count);
+            all.extend(self.at(alone, of_map, map, grid, measures, progress)?);
+        }
+        let place = |maps: &MinkowskiMaps| self.windows.iter().position(|w| *w == maps.window);
+        all.sort_by_key(place);
+        Ok(all)
     }
 
     fn at(
@@ -218,10 +242,10 @@ impl Analysis {
         thresholds: Thresholds,
         of_map: Statistics,
         map: &Map,
+        grid: Healpix,
         measures: &[impl AsRef<dyn Measure> + Sync],
         progress: impl FnMut(f64),
-    ) -> Result<MinkowskiMaps, AnalysisError> {
-        let grid = self.check(map.grid())?;
+    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
         if measures.is_empty() {
             return Err(AnalysisError::NoMeasure);
         }
@@ -247,18 +271,19 @@ impl Analysis {
             }
         };
         let field = Field::new(map.grid(), map.values(), &thresholds, self.body);
-        let Windows { columns: values, ways } = windows(
-            &field,
-            &selection,
-            grid,
-            &[self.window.to_radians()],
-            self.summation,
-            measures.len(),
-            evaluate,
-            progress,
-        )
-        .remove(0);
-        Ok(MinkowskiMaps { grid, thresholds, of_map, values, ways })
+        let radii: Vec<f64> = self.windows.iter().map(|degrees| degrees.to_radians()).collect();
+        let windows = MovingWindows {
+            field: &field,
+            selection: &selection,
+            output: grid,
+            radii: &radii,
+            summation: self.summation,
+        };
+        let all = windows.visit(measures.len(), evaluate, progress);
+        let maps = all.into_iter().zip(&self.windows).map(|(Windows { columns: values, ways }, &window)| {
+            MinkowskiMaps { grid, window, thresholds: thresholds.clone(), of_map, values, ways }
+        });
+        Ok(maps.collect())
     }
 
     /// Area, length and curvature of the whole unmasked sphere for each threshold, with the thresholds in the map's

@@ -11,13 +11,13 @@
 //! let map = Map::new("a pixel", values)?;
 //!
 //! let analysis = Analysis {
-//!     window: 20.0,
+//!     windows: vec![20.0],
 //!     thresholds: "0.5".parse()?,
 //!     threshold_unit: longan::ThresholdUnit::Value,
 //!     ..Analysis::default()
 //! };
 //! let maps = analysis.minkowski_maps(&map, &[find("w2")?, find("evq")?], |_| ())?;
-//! let (w2, evq) = (&maps.values[0], &maps.values[1]);
+//! let (w2, evq) = (&maps[0].values[0], &maps[0].values[1]);
 //! // The contour's total curvature in a window that holds all of it: 2π less the body's area.
 //! assert!((w2[400] - std::f64::consts::TAU).abs() < 0.02);
 //! assert!(evq[400] > 1.0 && evq[0].is_nan());

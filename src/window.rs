@@ -1,7 +1,8 @@
 //! Moments of moving windows: pixels within a radius of an output pixel, transported to its centre and summed.
 //!
-//! Works from north to south, holding pixel moments only for the rings that the windows of the present output rings
-//! reach. The sum over a window's pixels is taken one by one (`direct`), or ring by ring from prefix sums
+//! Works from north to south: the moments of a band of input rings are made, added to all windows that reach it, and
+//! dropped; a window is visited when all that it reaches is in. Of the output, only the rings that reach the present
+//! band hold sums. The sum over a window's pixels is taken one by one (`direct`), or ring by ring from prefix sums
 //! (`prefix`), whichever costs less. What a window's moments mean is left to whoever visits them.
 
 mod direct;
@@ -11,16 +12,23 @@ mod reach;
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use longan_formats::Healpix;
+use longan_formats::{Healpix, Ring};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::contour::Field;
 use crate::moments::{self, Layout, RingMoments, SHARES, Selection};
-use reach::{OutputRing, rings_within};
+use prefix::Plan;
+use reach::{OutputRing, Reached};
 
-/// Rings of input moments that are made at a time, at least.
+/// Rings of input moments that are made at a time.
 const BAND: usize = 128;
+
+/// Most output rings to a group.
+const GROUP: usize = 32;
+
+/// Most input rings to a block.
+const BLOCK: usize = 32;
 
 /// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]
@@ -45,7 +53,8 @@ pub enum Summation {
     /// Pixel by pixel.
     Exact,
     /// From prefix sums wherever that costs less and the phases of transport are met to this accuracy: then ψ_s is
-    /// off by at most this share of the window's W1. Areas, lengths, curvatures and masked fractions stay exact.
+    /// off by at most this share of the window's sum of |weights|, which is W1 where contours weigh by length. Areas,
+    /// lengths, curvatures and masked fractions stay exact.
     Tolerance(f64),
     /// The same, from prefix sums wherever that is accurate enough, whatever it costs.
     Prefix(f64),
@@ -61,8 +70,10 @@ impl Default for Summation {
 /// Which way the windows of one radius were summed, counted in pairs of an output pixel and an input ring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ways {
-    /// Pairs summed pixel by pixel.
+    /// Pairs summed pixel by pixel, since that costs less or is asked for.
     pub direct: usize,
+    /// Pairs summed pixel by pixel, since no fit of the phases meets the tolerance.
+    pub missed: usize,
     /// Pairs from prefix sums.
     pub prefix: usize,
     /// Largest error of a phase in those.
@@ -80,105 +91,182 @@ pub struct Windows {
     pub ways: Ways,
 }
 
-/// Visits the windows of each radius (radians; 0: the input pixel itself) about all pixels of `output`.
-///
-/// `visit` fills `columns` numbers for each window. `progress` is told the share done, from 0 to 1. The result does not
-/// depend on the number of threads.
-///
-/// # Panics
-/// For radius 0 if the output grid is not the input's.
-#[allow(clippy::too_many_arguments)]
-pub fn windows(
-    field: &Field<'_>,
-    selection: &Selection,
-    output: Healpix,
-    radii: &[f64],
-    summation: Summation,
-    columns: usize,
-    visit: impl Fn(&Moments, &mut [f64]) + Sync,
-    mut progress: impl FnMut(f64),
-) -> Vec<Windows> {
-    let input = field.grid();
-    let largest = radii.iter().copied().fold(0.0, f64::max);
-    assert!(!radii.contains(&0.0) || output == input, "a window of one pixel needs the input's grid");
-    let layout = Layout::new(selection, field.has_masked());
-    let empty = || vec![Vec::with_capacity(output.pixels()); columns];
-    let mut out: Vec<Windows> = radii.iter().map(|_| Windows { columns: empty(), ways: Ways::default() }).collect();
-    let mut band = Band { first: 1, rings: VecDeque::new() };
-    let mut next = 1;
-    while next <= output.rings() {
-        // As many output rings as make a band of input rings.
-        let first = next;
-        let mut reach = rings_within(input, output, first, largest);
-        let lowest = reach.end + BAND;
-        while next < output.rings() && rings_within(input, output, next + 1, largest).end <= lowest {
-            next += 1;
-            reach.end = reach.end.max(rings_within(input, output, next, largest).end);
+/// Windows of several radii about all pixels of a grid, moved over one field.
+#[derive(Clone, Copy, Debug)]
+pub struct MovingWindows<'a> {
+    /// The field.
+    pub field: &'a Field<'a>,
+    /// The moments to sum.
+    pub selection: &'a Selection,
+    /// The grid of the windows' centres.
+    pub output: Healpix,
+    /// Radii in radians; 0: the input pixel itself.
+    pub radii: &'a [f64],
+    /// How windows are summed.
+    pub summation: Summation,
+}
+
+impl MovingWindows<'_> {
+    /// Visits all windows, each radius by itself; the contour is followed once for all.
+    ///
+    /// `visit` fills `columns` numbers for each window. `progress` is told the share done, from 0 to 1. The result does
+    /// not depend on the number of threads.
+    ///
+    /// # Panics
+    /// For radius 0 if the output grid is not the field's.
+    pub fn visit(
+        &self,
+        columns: usize,
+        visit: impl Fn(&Moments, &mut [f64]) + Sync,
+        mut progress: impl FnMut(f64),
+    ) -> Vec<Windows> {
+        let input = self.field.grid();
+        assert!(!self.radii.contains(&0.0) || self.output == input, "a window of one pixel needs the input's grid");
+        let layout = Layout::new(self.selection, self.field.has_masked());
+        let mut sweeps: Vec<Sweep<'_>> =
+            self.radii.iter().map(|&radius| Sweep::new(self, &layout, radius, columns)).collect();
+        for first in (1..=input.rings()).step_by(BAND) {
+            let band = Band::new(self.field, &layout, first..(first + BAND).min(input.rings() + 1));
+            for sweep in &mut sweeps {
+                sweep.add(&band);
+                sweep.visit_finished(band.rings.end, &visit);
+            }
+            let last = input.ring(band.rings.end - 1);
+            progress((last.start + last.len) as f64 / input.pixels() as f64);
         }
-        next += 1;
-        band.advance(field, &layout, reach);
-        for (&radius, out) in radii.iter().zip(&mut out) {
-            let rings: Vec<OutputRing> =
-                (first..next).into_par_iter().map(|i| OutputRing::new(input, output, i, radius)).collect();
-            let groups = prefix::groups(&rings, &layout, radius, summation);
-            let quadrants: Vec<(Vec<Sums>, Ways)> = (0..4 * groups.len())
+        sweeps.into_iter().map(|sweep| sweep.windows).collect()
+    }
+}
+
+/// The windows of one radius on their way over the field.
+struct Sweep<'a> {
+    of: &'a MovingWindows<'a>,
+    layout: &'a Layout,
+    radius: f64,
+    /// Groups of output rings that have been reached but are not complete.
+    groups: VecDeque<Group>,
+    /// The next output ring to be reached.
+    next: Option<OutputRing>,
+    windows: Windows,
+}
+
+/// Neighbouring output rings, whose windows are summed together.
+struct Group {
+    rings: Vec<OutputRing>,
+    /// Input rings that may be reached.
+    reach: Range<usize>,
+    /// For each quadrant the windows of each ring.
+    quadrants: [Vec<Sums>; 4],
+    ways: Ways,
+}
+
+impl<'a> Sweep<'a> {
+    fn new(of: &'a MovingWindows<'a>, layout: &'a Layout, radius: f64, columns: usize) -> Self {
+        let columns = vec![Vec::new(); columns].into_iter().map(|_: Vec<f64>| Vec::with_capacity(of.output.pixels()));
+        let windows = Windows { columns: columns.collect(), ways: Ways::default() };
+        let next = Some(OutputRing::new(of.field.grid(), of.output, 1, radius));
+        Sweep { of, layout, radius, groups: VecDeque::new(), next, windows }
+    }
+
+    /// Adds a band of input rings to all windows that reach it.
+    fn add(&mut self, band: &Band) {
+        while self.next.as_ref().is_some_and(|ring| ring.reach.start < band.rings.end) {
+            let group = self.next_group();
+            self.groups.push_back(group);
+        }
+        let (of, layout, radius) = (self.of, self.layout, self.radius);
+        self.groups.par_iter_mut().for_each(|group| group.add(band, of, layout, radius));
+    }
+
+    /// The next output rings, no farther apart than the windows' radius: their phases differ little more than those
+    /// of one ring.
+    fn next_group(&mut self) -> Group {
+        let (input, output) = (self.of.field.grid(), self.of.output);
+        let mut rings: Vec<OutputRing> = Vec::new();
+        while let Some(ring) = self.next.take_if(|ring| {
+            rings.len() < GROUP && rings.first().is_none_or(|first| ring.theta - first.theta <= self.radius)
+        }) {
+            self.next =
+                (ring.number < output.rings()).then(|| OutputRing::new(input, output, ring.number + 1, self.radius));
+            rings.push(ring);
+        }
+        let reach = rings[0].reach.start..rings[rings.len() - 1].reach.end;
+        let sums = |_| rings.iter().map(|ring| Sums::new(ring.in_quadrant, self.layout.rows)).collect();
+        let quadrants = std::array::from_fn(sums);
+        Group { rings, reach, quadrants, ways: Ways::default() }
+    }
+
+    /// Visits the windows that reach no farther than `end`.
+    fn visit_finished(&mut self, end: usize, visit: &(impl Fn(&Moments, &mut [f64]) + Sync)) {
+        let Windows { columns, ways } = &mut self.windows;
+        while self.groups.front().is_some_and(|group| group.reach.end <= end) {
+            let Some(group) = self.groups.pop_front() else { break };
+            let tasks = 4 * group.rings.len();
+            let values: Vec<Vec<f64>> = (0..tasks)
                 .into_par_iter()
                 .map(|task| {
-                    let (group, quadrant) = (&groups[task / 4], task % 4);
-                    let rings = &rings[group.rings.clone()];
-                    match &group.plan {
-                        Some(plan) => prefix::sums(rings, quadrant, &band, &layout, plan),
-                        None => direct_sums(rings, quadrant, &band, &layout, radius == 0.0),
-                    }
+                    let (ring, quadrant) = (task / 4, task % 4);
+                    let sums = &group.quadrants[quadrant][ring];
+                    let thresholds = self.of.field.thresholds();
+                    visited(&group.rings[ring], quadrant, sums, self.layout, thresholds, columns.len(), visit)
                 })
                 .collect();
-            for (group, quadrants) in groups.iter().zip(quadrants.chunks_exact(4)) {
-                for (i, ring) in rings[group.rings.clone()].iter().enumerate() {
-                    let values: Vec<Vec<f64>> = (0..4usize)
-                        .into_par_iter()
-                        .map(|q| visited(ring, q, &quadrants[q].0[i], &layout, field.thresholds(), columns, &visit))
-                        .collect();
-                    for values in values {
-                        for (column, out) in out.columns.iter_mut().enumerate() {
-                            out.extend(values.iter().skip(column).step_by(columns));
-                        }
-                    }
-                }
-                quadrants.iter().for_each(|(_, ways)| out.ways.add(*ways));
+            let step = columns.len();
+            for (i, column) in columns.iter_mut().enumerate() {
+                values.iter().for_each(|values| column.extend(values.iter().skip(i).step_by(step)));
             }
+            ways.add(group.ways);
         }
-        let done = output.ring(next - 1);
-        progress((done.start + done.len) as f64 / output.pixels() as f64);
-    }
-    out
-}
-
-impl Ways {
-    fn add(&mut self, other: Ways) {
-        self.direct += other.direct;
-        self.prefix += other.prefix;
-        self.error = self.error.max(other.error);
-        self.terms = self.terms.max(other.terms);
     }
 }
 
-/// Windows of a quadrant of each output ring, pixel by pixel; `single`: of one pixel each.
-fn direct_sums(rings: &[OutputRing], quadrant: usize, band: &Band, layout: &Layout, single: bool) -> (Vec<Sums>, Ways) {
-    let sums = rings.iter().map(|ring| {
-        if !single {
-            return direct::sums(ring, quadrant, band, layout);
+impl Group {
+    /// Adds what of a band is within reach, block of input rings by block.
+    fn add(&mut self, band: &Band, of: &MovingWindows<'_>, layout: &Layout, radius: f64) {
+        let (mut first, end) = (self.reach.start.max(band.rings.start), self.reach.end.min(band.rings.end));
+        while first < end {
+            let north = band.theta(first);
+            let past = (first..end).find(|&i| i - first == BLOCK || band.theta(i) - north > radius / 4.0);
+            let rings = first..past.unwrap_or(end);
+            first = rings.end;
+            let block = Block::new(&self.rings, band, rings, radius);
+            let plan = if radius > 0.0 { Plan::new(&block, layout, of.summation) } else { None };
+            self.quadrants.par_iter_mut().enumerate().for_each(|(quadrant, sums)| match &plan {
+                Some(plan) => prefix::add(&block, quadrant, layout, plan, sums),
+                None if radius == 0.0 => add_pixels(&block, quadrant, layout, sums),
+                None => direct::add(&block, quadrant, layout, sums),
+            });
+            self.ways.add(match plan {
+                Some(plan) => plan.ways(&block),
+                None => Ways { direct: block.pairs().map(|(ring, _)| 4 * ring.in_quadrant).sum(), ..Ways::default() },
+            });
         }
-        let mut sums = Sums::new(ring.in_quadrant, layout.rows);
-        let moments = band.ring(ring.number);
+    }
+}
+
+/// A group's windows of one pixel each.
+fn add_pixels(block: &Block<'_>, quadrant: usize, layout: &Layout, sums: &mut [Sums]) {
+    for (ring, sums) in block.output.iter().zip(sums) {
+        if !block.rings.contains(&ring.number) {
+            continue;
+        }
+        let moments = block.band.moments(ring.number);
         for k in 0..ring.in_quadrant {
             let column = quadrant * ring.in_quadrant + k;
             let sums = sums.of(k, 1);
             (0..layout.rows).for_each(|row| sums[row] = moments.row(row)[column]);
         }
-        sums
-    });
-    let pairs = rings.iter().map(|ring| ring.in_quadrant * ring.reached.len()).sum();
-    (sums.collect(), Ways { direct: pairs, ..Ways::default() })
+    }
+}
+
+impl Ways {
+    fn add(&mut self, other: Ways) {
+        self.direct += other.direct;
+        self.missed += other.missed;
+        self.prefix += other.prefix;
+        self.error = self.error.max(other.error);
+        self.terms = self.terms.max(other.terms);
+    }
 }
 
 /// What `visit` makes of the windows of a quadrant.
@@ -200,7 +288,7 @@ fn visited(
         moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
         moments.masked_fraction = match (sums.pixels[k], layout.masked) {
             (0, _) => 1.0,
-            (pixels, Some(row)) => sum(row) / (SHARES * pixels) as f64,
+            (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
             (_, None) => 0.0,
         };
         moments.area = selected(layout.area);
@@ -220,7 +308,7 @@ struct Sums {
     /// The rows of each window.
     data: Vec<f64>,
     /// Number of pixels in each window.
-    pixels: Vec<usize>,
+    pixels: Vec<u64>,
 }
 
 impl Sums {
@@ -230,41 +318,72 @@ impl Sums {
 
     /// The rows of a window, to which this many pixels are to be added.
     fn of(&mut self, window: usize, pixels: usize) -> &mut [f64] {
-        self.pixels[window] += pixels;
+        self.pixels[window] += pixels as u64;
         &mut self.data[window * self.rows..(window + 1) * self.rows]
     }
 }
 
-/// Pixel moments of consecutive rings.
+/// Pixel moments of consecutive input rings.
 struct Band {
-    first: usize,
-    rings: VecDeque<RingMoments>,
+    rings: Range<usize>,
+    /// Each ring with its colatitude and moments.
+    of: Vec<(Ring, f64, RingMoments)>,
 }
 
 impl Band {
-    /// Drops the rings north of `reach` and adds those that are missing in the south.
-    fn advance(&mut self, field: &Field<'_>, layout: &Layout, reach: Range<usize>) {
-        while self.first < reach.start && self.rings.pop_front().is_some() {
-            self.first += 1;
-        }
-        self.first = self.first.max(reach.start);
-        let have = self.first + self.rings.len();
-        if have >= reach.end {
-            return;
-        }
-        let missing = reach.end - have;
-        let chunk = missing.div_ceil(2 * rayon::current_num_threads()).clamp(8, 64);
-        let made: Vec<Vec<RingMoments>> = (0..missing.div_ceil(chunk))
+    fn new(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Self {
+        // Each chunk goes once more over the cells that it shares with its neighbours.
+        let chunk = rings.len().div_ceil(2 * rayon::current_num_threads()).max(8);
+        let starts: Vec<usize> = rings.clone().step_by(chunk).collect();
+        let made: Vec<Vec<RingMoments>> = starts
             .into_par_iter()
-            .map(|i| {
-                let start = have + i * chunk;
-                moments::at_pixels(field, layout, start..(start + chunk).min(reach.end))
-            })
+            .map(|start| moments::at_pixels(field, layout, start..(start + chunk).min(rings.end)))
             .collect();
-        self.rings.extend(made.into_iter().flatten());
+        let geometry = rings.clone().map(|i| field.grid().ring(i));
+        let of = geometry.zip(made.into_iter().flatten()).map(|(ring, moments)| (ring, ring.theta(), moments));
+        Band { of: of.collect(), rings }
     }
 
-    fn ring(&self, i: usize) -> &RingMoments {
-        &self.rings[i - self.first]
+    fn theta(&self, ring: usize) -> f64 {
+        self.of[ring - self.rings.start].1
+    }
+
+    fn moments(&self, ring: usize) -> &RingMoments {
+        &self.of[ring - self.rings.start].2
+    }
+}
+
+/// Some input rings of a band as seen from a group of output rings.
+struct Block<'a> {
+    band: &'a Band,
+    rings: Range<usize>,
+    output: &'a [OutputRing],
+    /// For each input ring, for each output ring.
+    reached: Vec<Option<Reached>>,
+}
+
+impl<'a> Block<'a> {
+    fn new(output: &'a [OutputRing], band: &'a Band, rings: Range<usize>, radius: f64) -> Self {
+        let reached = rings.clone().flat_map(|i| {
+            let (ring, theta, _) = &band.of[i - band.rings.start];
+            output.iter().map(move |from| from.reached(i, ring, *theta, radius))
+        });
+        Block { reached: reached.collect(), band, rings, output }
+    }
+
+    /// The output rings that reach an input ring, each with its place among them.
+    fn reaching(&self, ring: usize) -> impl Iterator<Item = (usize, &'a OutputRing, &Reached)> {
+        let n = self.output.len();
+        let reached = &self.reached[(ring - self.rings.start) * n..][..n];
+        self.output
+            .iter()
+            .zip(reached)
+            .enumerate()
+            .filter_map(|(i, (ring, reached))| Some((i, ring, reached.as_ref()?)))
+    }
+
+    /// All pairs of an output ring and an input ring that it reaches.
+    fn pairs(&self) -> impl Iterator<Item = (&'a OutputRing, &Reached)> {
+        self.rings.clone().flat_map(|ring| self.reaching(ring).map(|(_, ring, reached)| (ring, reached)))
     }
 }

@@ -3,7 +3,7 @@ use longan::measures::{BuiltIn, find};
 use longan::moments::{Selection, Weight};
 use longan::simulate::Waves;
 use longan::totals::{Totals, totals};
-use longan::window::{Summation, windows};
+use longan::window::{MovingWindows, Summation};
 use longan::{Analysis, Body, Healpix, Map, ThresholdUnit, Thresholds};
 
 use super::{difference, masked, noise, turned};
@@ -100,12 +100,14 @@ fn moments_by(
     weight: Weight,
 ) -> Vec<Vec<f64>> {
     let selection = Selection { area: true, length: true, curvature: true, ranks: (1..=6).collect(), weight };
-    windows(
-        &Field::new(map.grid(), map.values(), at, body),
-        &selection,
-        Healpix::new(output).unwrap(),
-        &[f64::to_radians(radius)],
+    MovingWindows {
+        field: &Field::new(map.grid(), map.values(), at, body),
+        selection: &selection,
+        output: Healpix::new(output).unwrap(),
+        radii: &[f64::to_radians(radius)],
         summation,
+    }
+    .visit(
         4 + 2 * 6,
         |m, out| {
             out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
@@ -204,7 +206,7 @@ fn thresholds_average() {
 
 fn analyse(threads: usize, map: &Map, analysis: &Analysis, measures: &[BuiltIn]) -> Vec<Vec<f64>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| analysis.minkowski_maps(map, measures, |_| ())).unwrap().values
+    pool.install(|| analysis.minkowski_maps(map, measures, |_| ())).unwrap().remove(0).values
 }
 
 #[test]
@@ -230,8 +232,8 @@ fn masked_windows_are_masked_and_others_rescaled() {
     let measures = ["w1", "contour-length", "masked-fraction", "psi2"].map(|name| find(name).unwrap());
     let with = |max_masked| {
         let analysis =
-            Analysis { window: 15.0, threshold_unit: ThresholdUnit::Sigma, max_masked, ..Analysis::default() };
-        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().values
+            Analysis { windows: vec![15.0], threshold_unit: ThresholdUnit::Sigma, max_masked, ..Analysis::default() };
+        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0).values
     };
     let (all, some) = (with(1.0), with(0.2));
     let fraction = &all[2];

@@ -7,7 +7,7 @@ use cdshealpix::compass_point::MainWind::{E, NE, SE};
 use longan::contour::Field;
 use longan::moments::{Selection, Weight};
 use longan::totals::totals;
-use longan::window::{Moments, Summation, windows};
+use longan::window::{Moments, MovingWindows, Summation};
 use longan::{Body, Healpix, Map, Thresholds};
 use proptest::prelude::*;
 
@@ -210,12 +210,14 @@ fn compare(case: &Case<'_>, output: usize, radius: f64) -> f64 {
     };
     let map = Map::new("", case.values.to_vec()).unwrap();
     let field = Field::new(grid, map.values(), &thresholds, body);
-    let fast = windows(
-        &field,
-        &selection,
-        out,
-        &[radius],
-        Summation::Exact,
+    let fast = MovingWindows {
+        field: &field,
+        selection: &selection,
+        output: out,
+        radii: &[radius],
+        summation: Summation::Exact,
+    }
+    .visit(
         ROWS,
         |m, row| {
             row[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
@@ -296,7 +298,16 @@ fn single_pixels_agree() {
         let selection = Selection { length: true, ranks: vec![3], ..Selection::default() };
         let of = |radius| {
             let visit = |m: &Moments, out: &mut [f64]| out.copy_from_slice(&[m.length, m.psi[0].re]);
-            windows(&field, &selection, grid, &[radius], Summation::Exact, 2, visit, |_| ()).remove(0).columns
+            MovingWindows {
+                field: &field,
+                selection: &selection,
+                output: grid,
+                radii: &[radius],
+                summation: Summation::Exact,
+            }
+            .visit(2, visit, |_| ())
+            .remove(0)
+            .columns
         };
         assert!(super::difference(&of(0.0).concat(), &of(1e-3).concat()) < 1e-14);
     }

@@ -65,7 +65,7 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     }
     let thresholds = Thresholds::new(table.thresholds.clone().unwrap()).unwrap();
     let analysis = Analysis {
-        window,
+        windows: vec![window],
         thresholds: thresholds.clone(),
         threshold_unit: ThresholdUnit::Value,
         nside_out: Some(nside_out),
@@ -76,7 +76,7 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     let column = |name: &str| &table.columns[name];
     let run = |names: &[&str]| {
         let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
-        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().values
+        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0).values
     };
 
     let names = ["masked-fraction", "w0", "contour-length", "w2", "evq", "rank4-min", "rank4-mid", "rank4-max"];
@@ -129,7 +129,7 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     if table.columns.contains_key("litchi_evq") {
         let analysis = Analysis { max_masked: 1.0 / 16.0, ..analysis.clone() };
         check_litchi(&table, |name| {
-            analysis.minkowski_maps(&map, &[find(name).unwrap()], |_| ()).unwrap().values.remove(0)
+            analysis.minkowski_maps(&map, &[find(name).unwrap()], |_| ()).unwrap().remove(0).values.remove(0)
         });
     }
 }
@@ -213,7 +213,7 @@ fn layouts_of_one_sky_agree() {
     let run = |file: &str| {
         let map = read(&shared.join("data").join(file));
         let measures = ["evq", "w0"].map(|n| find(n).unwrap());
-        Analysis::default().minkowski_maps(&map, &measures, |_| ()).unwrap().values
+        Analysis::default().minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0).values
     };
     let (ring, nested) = (run("grf_nside128_ring_f64.fits"), run("grf_nside128_nested_f32.fits.gz"));
     for (a, b) in ring.iter().zip(&nested) {

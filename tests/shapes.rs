@@ -19,7 +19,7 @@ fn solid(shape: Shape, lon: f64, lat: f64, size: f64) -> Solid {
 /// Measures in the window about the output pixel that holds a place.
 fn there(map: &Map, analysis: &Analysis, names: &[&str], (lon, lat): (f64, f64)) -> Vec<f64> {
     let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
-    let maps = analysis.minkowski_maps(map, &measures, |_| ()).unwrap();
+    let maps = analysis.minkowski_maps(map, &measures, |_| ()).unwrap().remove(0);
     let pixel = maps.grid.pixel_at((90.0 - lat).to_radians(), lon.to_radians());
     maps.values.iter().map(|v| v[pixel]).collect()
 }
@@ -42,7 +42,7 @@ fn smooth_rectangles_converge_to_the_moments_of_their_sides() {
     for (shape, a, b) in [(Shape::Square, 4.0, 4.0), (Shape::Rectangle2, 6.0, 3.0), (Shape::Rectangle3, 6.0, 2.0)] {
         let [coarse, fine] = [256, 512].map(|nside| {
             let map = shapes(Healpix::new(nside).unwrap(), &[solid(shape, 20.0, 30.0, a)], Edge::Smooth);
-            there(&map, &Analysis { window: 8.0, ..at(0.0) }, &names, (20.0, 30.0))
+            there(&map, &Analysis { windows: vec![8.0], ..at(0.0) }, &names, (20.0, 30.0))
         });
         let (a, b) = (f64::to_radians(a), f64::to_radians(b));
         let limits = [2.0 * (a - b), 2.0 * (a + b), 2.0 * (a + b)];
@@ -64,7 +64,7 @@ fn a_smooth_cap_is_round() {
         let (lon, lat) = (phi.to_degrees(), 90.0 - theta.to_degrees());
         let map = shapes(Healpix::new(512).unwrap(), &[solid(Shape::Cap, lon, lat, 6.0)], Edge::Smooth);
         let names = ["w0", "w1", "w2", "psi1", "psi2", "psi3", "psi4"];
-        let got = there(&map, &Analysis { window: 10.0, ..at(0.0) }, &names, (lon, lat));
+        let got = there(&map, &Analysis { windows: vec![10.0], ..at(0.0) }, &names, (lon, lat));
         assert!((got[0] / (TAU * (1.0 - r.cos())) - 1.0).abs() < 5e-4, "area {got:?}");
         assert!((got[1] / (TAU * r.sin()) - 1.0).abs() < 2e-4, "length {got:?}");
         // The window holds all of the contour, so Gauss–Bonnet holds within it.
@@ -78,7 +78,8 @@ fn a_smooth_cap_is_round() {
 #[test]
 fn a_triangle_has_only_every_third_moment() {
     let map = shapes(Healpix::new(512).unwrap(), &[solid(Shape::Triangle, 0.0, 10.0, 4.0)], Edge::Smooth);
-    let got = there(&map, &Analysis { window: 8.0, ..at(0.0) }, &["q1", "q2", "q3", "q4", "q5", "q6"], (0.0, 10.0));
+    let got =
+        there(&map, &Analysis { windows: vec![8.0], ..at(0.0) }, &["q1", "q2", "q3", "q4", "q5", "q6"], (0.0, 10.0));
     for (i, q) in got.iter().enumerate() {
         let limit = f64::from(u8::from((i + 1) % 3 == 0));
         assert!((q - limit).abs() < 0.05, "q{}: {q}", i + 1);

@@ -2,7 +2,7 @@
 
 use longan::contour::Field;
 use longan::moments::{Selection, Weight};
-use longan::window::{Summation, Ways, windows};
+use longan::window::{MovingWindows, Summation, Ways};
 use longan::{Body, Healpix, Map, Thresholds};
 
 use super::{masked, noise};
@@ -21,12 +21,14 @@ pub(crate) fn moments(
     let selection = Selection { area: true, length: true, curvature: true, ranks: (1..=RANKS).collect(), weight };
     let thresholds = Thresholds::new(at.to_vec()).unwrap();
     let field = Field::new(map.grid(), map.values(), &thresholds, Body::Above);
-    let mut all = windows(
-        &field,
-        &selection,
-        Healpix::new(output).unwrap(),
-        &[f64::to_radians(radius)],
+    let mut all = MovingWindows {
+        field: &field,
+        selection: &selection,
+        output: Healpix::new(output).unwrap(),
+        radii: &[f64::to_radians(radius)],
         summation,
+    }
+    .visit(
         4 + 2 * RANKS as usize,
         |m, out| {
             out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);

@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         nside_out: Some(NSIDE_OUT),
         ..Analysis::default()
     };
-    let maps = analysis.minkowski_maps(&bodies, &evq, |_| ())?;
+    let maps = analysis.minkowski_maps(&bodies, &evq, |_| ())?.remove(0);
     say(format!("Bodies of 4 to 6 degrees at Nside {}, EVQ in a window of 6 degrees about their middle:", NSIDE[0]))?;
     for (name, longitude, sides) in [("square", -135.0, 1), ("2:1 rectangle", -90.0, 2), ("3:1 rectangle", -45.0, 3)] {
         let pixel = maps.grid.pixel_at(std::f64::consts::FRAC_PI_2, f64::to_radians(longitude));
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     write("waves.fits", &file(&field, waves_cards(&waves, correlation, seed)))?;
     let analysis = Analysis { nside_out: Some(NSIDE_OUT), ..Analysis::default() };
     let start = Instant::now();
-    let maps = analysis.minkowski_maps(&field, &evq, |_| ())?;
+    let maps = analysis.minkowski_maps(&field, &evq, |_| ())?.remove(0);
     let seconds = start.elapsed().as_secs_f64();
     let (thresholds, totals, _) = analysis.totals(&field)?;
     say(format!("\nGaussian field of correlation angle {correlation} degrees at Nside {}:", NSIDE[1]))?;

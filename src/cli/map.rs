@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 use longan::formats::{self, Healpix, Map, Ordering};
 use longan::measures::{BuiltIn, Measure, find};
 use longan::statistics::statistics;
-use longan::window::Summation;
-use longan::{Analysis, Weight};
+use longan::window::{Summation, Ways};
+use longan::{Analysis, MinkowskiMaps, Weight};
 
 use super::options::{BodyOptions, Input, Running, between, check_memory, decimals, nside, shown};
 use super::output::Provenance;
@@ -29,6 +29,7 @@ Examples:
   longan map sky.fits -o out.fits --measure evq,evq-direction,psi4,rank4-mid --mask mask.fits
   longan map sky.fits -o out.fits --thresholds -100,0,100 --sequence
   longan map rain.fits -o out.fits --thresholds log:0.1:100:7 --window 4 --nside-out 64
+  longan map sky.fits -o out.fits --nside-out 512 --window 4,6,10 --verbose
   longan map sims/*.fits -o maps/ --resume
 
 The output opens in healpy: healpy.read_map('evq.fits'). Masked and undefined pixels are UNSEEN.")]
@@ -42,10 +43,11 @@ pub(crate) struct Arguments {
     /// Measures, separated by commas, such as evq,psi2-direction; `longan measures` explains them all.
     #[arg(long, value_name = "LIST", default_value = "evq")]
     measure: Measures,
-    /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside.
-    #[arg(long, value_name = "DEG", default_value_t = 6.0)]
+    /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside. Several, such as
+    /// 4,6,10, make an extension each.
+    #[arg(long, value_name = "DEG,...", default_value = "6", value_delimiter = ',')]
     #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
-    window: f64,
+    window: Vec<f64>,
     /// Nside of the output [default: the smaller of 16 and the input's; for --window 0 the input's].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
     nside_out: Option<usize>,
@@ -85,6 +87,9 @@ pub(crate) struct Arguments {
     resume: bool,
     #[command(flatten)]
     running: Running,
+    /// Say how the windows were summed, and why.
+    #[arg(long, short, conflicts_with = "quiet")]
+    verbose: bool,
 }
 
 /// Measures, no two the same.
@@ -200,7 +205,7 @@ impl Arguments {
 
     fn analysis(&self) -> Analysis {
         Analysis {
-            window: self.window,
+            windows: self.window.clone(),
             weight: match self.weight {
                 WeightOption::Length => Weight::Length,
                 WeightOption::Curvature => Weight::Curvature,
@@ -220,16 +225,19 @@ impl Arguments {
         let grid = analysis.check(map.grid()).with_context(about)?;
         let ordering = self.ordering_for(&map, grid).with_context(about)?;
         let measures = &self.measure.0;
-        let extensions = if self.sequence { analysis.thresholds.values().len() } else { 1 };
+        let extensions = analysis.windows.len() * if self.sequence { analysis.thresholds.values().len() } else { 1 };
         check_memory(grid, extensions * measures.len()).with_context(about)?;
         let progress = Progress::new(about(), self.running.quiet);
         let maps = if self.sequence {
             analysis.sequence(&map, measures, |share| progress.set(share))
         } else {
-            analysis.minkowski_maps(&map, measures, |share| progress.set(share)).map(|maps| vec![maps])
+            analysis.minkowski_maps(&map, measures, |share| progress.set(share))
         }
         .with_context(about)?;
         drop(progress);
+        if self.verbose {
+            maps.iter().try_for_each(|maps| self.running.say(explained(maps)))?;
+        }
         let summary = self.summary(&maps[0].values[0], maps[0].grid);
         let provenance =
             Provenance { path, map: &map, input: &self.input, analysis: &analysis, command: self.command(path) };
@@ -269,4 +277,21 @@ impl Arguments {
         let quoted = shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_else(|_| words.join(" "));
         format!("longan {quoted}")
     }
+}
+
+/// How the windows of a map were summed, and why.
+fn explained(maps: &MinkowskiMaps) -> String {
+    let Ways { direct, missed, prefix, error, terms } = maps.ways;
+    let mut ways = Vec::new();
+    let all = (direct + missed + prefix).max(1) as f64;
+    let mut way = |pairs: usize, how: String| {
+        if pairs > 0 {
+            ways.push(format!("{} % {how}", decimals(100.0 * pairs as f64 / all, 1)));
+        }
+    };
+    way(prefix, format!("from prefix sums with up to {terms} terms, psi_s to {error:.1e} of W1"));
+    way(direct, "pixel by pixel, which costs less there or was asked for".to_owned());
+    way(missed, "pixel by pixel, since no fit met the tolerance".to_owned());
+    let pairs = "of all pairs of an output pixel and an input ring";
+    format!("window of {} degrees, {pairs}: {}", maps.window, ways.join("; "))
 }

@@ -56,13 +56,21 @@ impl Provenance<'_> {
         ordering: Ordering,
         float32: bool,
     ) -> HealpixFile {
-        let sequence = maps.len() > 1;
+        let windows = self.analysis.windows.len();
+        let thresholds = maps.len() / windows;
+        let name = |i: usize, window: f64| match (windows, thresholds) {
+            (1, 1) => "MINKOWSKI MAP".to_owned(),
+            (1, _) => format!("THRESHOLD {}", i + 1),
+            (_, 1) => format!("WINDOW {window}"),
+            (_, _) => format!("WINDOW {window} THRESHOLD {}", i % thresholds + 1),
+        };
         let grid = maps[0].grid;
         let extensions = maps.into_iter().enumerate().map(|(i, maps)| {
+            let name = name(i, maps.window);
             let cards = self.cards(&maps);
             let columns = measures.iter().zip(maps.values);
             Extension {
-                name: if sequence { format!("THRESHOLD {}", i + 1) } else { "MINKOWSKI MAP".to_owned() },
+                name,
                 cards,
                 history: Vec::new(),
                 columns: columns
@@ -96,8 +104,8 @@ impl Provenance<'_> {
         cards.extend([
             real("INMEAN", maps.of_map.mean, "mean of the unmasked pixels"),
             real("INSIGMA", maps.of_map.sigma, "their standard deviation"),
-            real("WINDOW", analysis.window, "[deg] radius of the window, 0: the pixel itself"),
-            real("PSIERROR", maps.ways.error, "largest error of psi_s over W1, 0: summed pixel by pixel"),
+            real("WINDOW", maps.window, "[deg] radius of the window, 0: the pixel itself"),
+            real("PSIERROR", maps.ways.error, "error of psi_s over sum of |weights|, 0: direct sum"),
             real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
             text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
             text(

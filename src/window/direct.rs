@@ -6,82 +6,79 @@ use std::ops::Range;
 use num_complex::Complex64;
 
 use super::reach::{OutputRing, Reached};
-use super::{Band, Sums};
+use super::{Block, Sums};
 use crate::moments::{Layout, RingMoments};
 use crate::transport::{Phases, Powers};
 
 /// Pixels transported at a time.
-const BLOCK: usize = 32;
+const PIXELS: usize = 32;
 
 /// Numbers summed side by side, as many as the widest vector units hold.
 const LANES: usize = 8;
 
-/// Windows about the pixels of one quadrant of an output ring.
+/// Adds a block of input rings to the windows about the pixels of one quadrant of a group's rings.
 ///
 /// Longitudes are counted from the quadrant's own meridian, so that a field turned by 90° gives the same windows to
 /// the last bit.
-pub(super) fn sums(ring: &OutputRing, quadrant: usize, band: &Band, layout: &Layout) -> Sums {
-    let mut sums = Sums::new(ring.in_quadrant, layout.rows);
+pub(super) fn add(block: &Block<'_>, quadrant: usize, layout: &Layout, sums: &mut [Sums]) {
     // Input ring by input ring, so that what neighbouring windows share is read once.
-    for reached in &ring.reached {
-        add_ring(ring, reached, 0..ring.in_quadrant, quadrant, band, layout, &mut sums);
+    for number in block.rings.clone() {
+        for (i, ring, reached) in block.reaching(number) {
+            add_ring(ring, reached, quadrant, block.band.moments(number), layout, &mut sums[i]);
+        }
     }
-    sums
 }
 
-/// Adds what the windows about these pixels of an output ring's quadrant hold of one input ring.
+/// Adds what the windows about the pixels of an output ring's quadrant hold of one input ring.
 pub(super) fn add_ring(
     ring: &OutputRing,
     reached: &Reached,
-    pixels: Range<usize>,
     quadrant: usize,
-    band: &Band,
+    moments: &RingMoments,
     layout: &Layout,
     sums: &mut Sums,
 ) {
-    let moments = band.ring(reached.number);
     let steps = Steps::new(reached.len);
     // Where the input ring's pixels lie in the same way about each output pixel, their phases are the same.
-    let alike = reached.len.is_multiple_of(4 * ring.in_quadrant).then(|| reached.len / (4 * ring.in_quadrant));
+    let stride = ring.stride(reached);
     let (from_first, to_first) = reached.span(ring.phi_of(0));
     let mut turns = Vec::new();
-    for k in pixels.clone() {
+    for k in 0..ring.in_quadrant {
         let phi = ring.phi_of(k);
-        let (from, to) = match alike {
+        let (from, to) = match stride {
             Some(pixels) => (from_first + (k * pixels) as isize, to_first + (k * pixels) as isize),
             None => reached.span(phi),
         };
         let start = reached.column(from, quadrant);
         let columns = start..start + (to - from).max(0) as usize;
-        if alike.is_none() || k == pixels.start {
-            let dphi =
-                if alike.is_some() { reached.phi_of(from_first) - ring.phi_of(0) } else { reached.phi_of(from) - phi };
+        if stride.is_none() || k == 0 {
+            let dphi = reached.phi_of(from) - phi;
             find_turns(columns.len(), layout, dphi, reached, &steps, &mut turns);
         }
         let sums = sums.of(k, columns.len());
         if columns.end <= reached.len {
-            add(moments, layout, columns, &turns, sums);
+            add_pixels(moments, layout, columns, &turns, sums);
         } else {
             // Across φ = 0: put together first, so that the sum is the same wherever the window lies.
             let joined = moments.joined(columns.start..reached.len, 0..columns.end - reached.len);
-            add(&joined, layout, 0..columns.len(), &turns, sums);
+            add_pixels(&joined, layout, 0..columns.len(), &turns, sums);
         }
     }
 }
 
 /// e^{iφ} for the longitudes of pixels in a ring, counted from the first.
 struct Steps {
-    steps: Phases<BLOCK>,
-    /// The same for BLOCK pixels.
+    steps: Phases<PIXELS>,
+    /// The same for PIXELS pixels.
     stride: Complex64,
 }
 
 impl Steps {
     fn new(len: usize) -> Self {
-        let mut steps = [Complex64::ONE; BLOCK];
+        let mut steps = [Complex64::ONE; PIXELS];
         steps[1] = Complex64::cis(TAU / len as f64);
-        (2..BLOCK).for_each(|k| steps[k] = steps[k / 2] * steps[k - k / 2]);
-        let stride = steps[BLOCK / 2] * steps[BLOCK / 2];
+        (2..PIXELS).for_each(|k| steps[k] = steps[k / 2] * steps[k - k / 2]);
+        let stride = steps[PIXELS / 2] * steps[PIXELS / 2];
         Steps { steps: Phases { re: steps.map(|s| s.re), im: steps.map(|s| s.im) }, stride }
     }
 }
@@ -95,16 +92,16 @@ fn find_turns(
     dphi: f64,
     reached: &Reached,
     steps: &Steps,
-    turns: &mut Vec<Phases<BLOCK>>,
+    turns: &mut Vec<Phases<PIXELS>>,
 ) {
     turns.clear();
     if layout.ranks.is_empty() {
         return;
     }
     let mut base = Complex64::cis(dphi);
-    for _ in 0..pixels.div_ceil(BLOCK) {
-        let mut phases = Phases::<BLOCK>::default();
-        for k in 0..BLOCK {
+    for _ in 0..pixels.div_ceil(PIXELS) {
+        let mut phases = Phases::<PIXELS>::default();
+        for k in 0..PIXELS {
             let (step_re, step_im) = (steps.steps.re[k], steps.steps.im[k]);
             let (cos, sin) = (base.re * step_re - base.im * step_im, base.re * step_im + base.im * step_re);
             let phase = reached.transport.phase(cos, sin);
@@ -118,7 +115,7 @@ fn find_turns(
 
 /// Adds the moments of a range of pixels of a ring, each turned by its phase.
 #[multiversion::multiversion(targets = "simd")]
-fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, turns: &[Phases<BLOCK>], sums: &mut [f64]) {
+fn add_pixels(ring: &RingMoments, layout: &Layout, columns: Range<usize>, turns: &[Phases<PIXELS>], sums: &mut [f64]) {
     for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
         *sum += sum_of(&ring.row(row)[columns.clone()]);
     }
@@ -127,7 +124,7 @@ fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, turns: &[Phas
         let row = layout.first_rank + 2 * rank;
         let (re, im) = (&ring.row(row)[columns.clone()], &ring.row(row + 1)[columns.clone()]);
         let mut sum = Complex64::ZERO;
-        for (block, (re, im)) in re.chunks(BLOCK).zip(im.chunks(BLOCK)).enumerate() {
+        for (block, (re, im)) in re.chunks(PIXELS).zip(im.chunks(PIXELS)).enumerate() {
             sum += sum_of_turned(re, im, &turns[block * ranks + rank]);
         }
         sums[row] += sum.re;
@@ -149,7 +146,7 @@ fn sum_of(values: &[f64]) -> f64 {
 
 /// Sum of the complex numbers re + i im, each turned by its phase.
 #[inline(always)]
-fn sum_of_turned(re: &[f64], im: &[f64], by: &Phases<BLOCK>) -> Complex64 {
+fn sum_of_turned(re: &[f64], im: &[f64], by: &Phases<PIXELS>) -> Complex64 {
     let (mut lanes_re, mut lanes_im) = ([0.0; LANES], [0.0; LANES]);
     let mut add = |lane: usize, re: f64, im: f64, u: f64, v: f64| {
         lanes_re[lane] += re * u - im * v;

@@ -2,29 +2,24 @@
 //! many pixels the ring has within the window.
 //!
 //! For a fixed pair of rings the phase of transport is a smooth function of x = Δφ, so
-//! e^{isδ(x)} ≈ Σ_k c_k e^{i m_k x} with real c_k. The frequencies m_k are common to a group of output rings and
-//! a fit gives the c_k of each pair. So prefix sums of P e^{i m_k φ} along an input ring turn its part of a window into
-//! two look-ups. Each fit's error is measured between its nodes; a pair that misses the tolerance is summed directly.
+//! e^{isδ(x)} ≈ Σ_k c_k e^{i m_k x} with real c_k. The frequencies m_k are common to all pairs of a block of input rings
+//! and a group of output rings ([`fit`]), each pair has its own c_k. So prefix sums of P e^{i m_k φ} along an input ring
+//! turn its part of a window into two look-ups. Each pair's error is measured; one that misses the tolerance is
+//! summed directly.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+mod fit;
+
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-use nalgebra::DMatrix;
 use num_complex::Complex64;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::reach::{OutputRing, Reached};
-use super::{Band, Summation, Sums, Ways, direct};
-use crate::moments::Layout;
+use super::{Block, Summation, Sums, Ways, direct};
+use crate::moments::{Layout, RingMoments};
 use crate::transport::RingTransport;
-
-/// Numbers side by side; terms come in multiples of it.
-const LANES: usize = 4;
-
-/// Numbers of terms to a phase that are tried in turn.
-const TERMS: [usize; 4] = [4, 8, 12, 16];
-
-/// Most output rings to a group.
-const GROUP: usize = 32;
+use fit::Terms;
 
 /// Output pixels of a ring that are summed at a time, about: what they need stays in the processor's cache.
 const TILE: usize = 256;
@@ -32,115 +27,125 @@ const TILE: usize = 256;
 /// Prefix sums are used where they take less than this share of the direct sum's time.
 const WORTHWHILE: f64 = 0.5;
 
-/// Singular values below this share of the largest are dropped from a fit.
-const SINGULAR: f64 = 1e-13;
-
-/// Output rings that are summed in one way.
-pub(super) struct Group {
-    /// Their places among the rings of the band.
-    pub(super) rings: Range<usize>,
-    /// How to sum them from prefix sums; directly without.
-    pub(super) plan: Option<Plan>,
-}
-
-/// Prefix sums for a group: how many numbers a pixel has, and the terms of each rank.
+/// How to sum a block from prefix sums.
 pub(super) struct Plan {
-    ranks: Vec<Terms>,
-    /// Plain rows, then real and imaginary parts of each rank's terms; each part a multiple of [`LANES`].
-    width: usize,
-    tolerance: f64,
+    ranks: Vec<Rank>,
+    /// For each pair of the block (input ring by input ring) whether its fits meet the tolerance; nothing where the
+    /// output ring does not reach the input ring.
+    fits: Vec<Option<bool>>,
+    /// Largest error of the pairs that do.
+    error: f64,
+    /// Largest half-width of the block, in radians.
+    width: f64,
 }
 
-/// The terms of one rank's phase.
-struct Terms {
-    rank: u32,
-    /// m_k.
-    frequencies: Vec<f64>,
-    /// From values at the nodes (real parts, then imaginary parts) to c_k.
-    fit: DMatrix<f64>,
-    nodes: Vec<Node>,
-    checks: Vec<Node>,
-}
-
-/// A place x at which a phase is taken.
-struct Node {
-    cos: f64,
-    sin: f64,
-    /// e^{−i m x} with m the middle frequency.
-    back: Complex64,
-    /// e^{i (m_k − m) x}.
-    terms: Vec<Complex64>,
-}
-
-/// Divides rings into groups and finds the cheaper way for each.
-pub(super) fn groups(rings: &[OutputRing], layout: &Layout, radius: f64, summation: Summation) -> Vec<Group> {
-    let (tolerance, worthwhile) = match summation {
-        Summation::Exact => return (0..rings.len()).map(|i| Group { rings: i..i + 1, plan: None }).collect(),
-        Summation::Tolerance(tolerance) => (tolerance, WORTHWHILE),
-        Summation::Prefix(tolerance) => (tolerance, f64::INFINITY),
-    };
-    // Groups no higher than the window's radius: their phases differ little more than those of one ring.
-    let mut groups = Vec::new();
-    let mut start = 0;
-    for end in 1..=rings.len() {
-        let full = end - start == GROUP || end == rings.len() || rings[end].theta - rings[start].theta > radius;
-        if full {
-            let plan = Plan::new(&rings[start..end], layout, tolerance);
-            match plan
-                .filter(|plan| plan.cost(&rings[start..end]) < worthwhile * direct_cost(&rings[start..end], layout))
-            {
-                Some(plan) => groups.push(Group { rings: start..end, plan: Some(plan) }),
-                None => groups.extend((start..end).map(|i| Group { rings: i..i + 1, plan: None })),
-            }
-            start = end;
-        }
-    }
-    groups
-}
-
-/// Nanoseconds, about, that summing a quadrant directly takes.
-fn direct_cost(rings: &[OutputRing], layout: &Layout) -> f64 {
-    let pixel = 1.0 + 0.3 * layout.first_rank as f64 + 0.7 * layout.ranks.len() as f64;
-    let of_ring = |ring: &OutputRing| {
-        let pixels: f64 = ring.reached.iter().map(|r| 2.0 * r.half_width / r.phi.1).sum();
-        ring.in_quadrant as f64 * (pixels * pixel + 30.0 * ring.reached.len() as f64)
-    };
-    rings.iter().map(of_ring).sum()
+/// The fits of one rank.
+struct Rank {
+    terms: Terms,
+    /// The c_k of each pair, twice: for the real and for the imaginary parts.
+    factors: Vec<f64>,
 }
 
 impl Plan {
-    /// The smallest sets of terms that meet the tolerance on a sample of the group's pairs.
-    fn new(rings: &[OutputRing], layout: &Layout, tolerance: f64) -> Option<Plan> {
-        let width = rings.iter().flat_map(|ring| &ring.reached).map(|r| r.half_width).fold(0.0, f64::max);
-        let mut sample: Vec<RingTransport> = Vec::new();
-        for ring in [rings.first()?, &rings[rings.len() / 2], rings.last()?] {
-            let n = ring.reached.len();
-            sample.extend(
-                [0, n / 4, n / 2, 3 * n / 4, n.saturating_sub(1)]
-                    .iter()
-                    .filter_map(|&i| ring.reached.get(i))
-                    .map(|r| r.transport),
-            );
+    /// A plan for the block, where prefix sums cost less than the direct sum and meet the tolerance.
+    pub(super) fn new(block: &Block<'_>, layout: &Layout, summation: Summation) -> Option<Plan> {
+        let (tolerance, worthwhile) = match summation {
+            Summation::Exact => return None,
+            Summation::Tolerance(tolerance) => (tolerance, WORTHWHILE),
+            Summation::Prefix(tolerance) => (tolerance, f64::INFINITY),
+        };
+        let width = block.pairs().map(|(_, r)| r.half_width).max_by(f64::total_cmp)?;
+        let budget = if worthwhile.is_finite() { worthwhile * direct_cost(block, layout) } else { f64::INFINITY };
+        if cost(block, layout, layout.ranks.len() * fit::FEWEST, width) > budget {
+            return None;
         }
-        let ranks: Option<Vec<Terms>> =
+        let sample = sample(block);
+        let terms: Option<Vec<Terms>> =
             layout.ranks.iter().map(|&rank| Terms::new(rank, width, &sample, tolerance)).collect();
-        let ranks = ranks?;
-        let terms: usize = ranks.iter().map(|t| 2 * t.frequencies.len()).sum();
-        Some(Plan { ranks, width: layout.first_rank.next_multiple_of(LANES) + terms, tolerance })
+        let terms = terms?;
+        if cost(block, layout, terms.iter().map(Terms::count).sum(), width) > budget {
+            return None;
+        }
+        let mut plan = Plan::with(terms, width, block.reached.len());
+        for (i, reached) in block.reached.iter().enumerate() {
+            let Some(reached) = reached else { continue };
+            let error = plan.ranks.iter_mut().map(|rank| rank.fit(i, &reached.transport)).fold(0.0, f64::max);
+            plan.fits[i] = Some(error <= tolerance);
+            if error <= tolerance {
+                plan.error = plan.error.max(error);
+            }
+        }
+        Some(plan)
     }
 
-    /// Nanoseconds, about, that summing a quadrant of these rings takes.
-    fn cost(&self, rings: &[OutputRing]) -> f64 {
-        let pairs: f64 = rings.iter().map(|ring| (ring.in_quadrant * ring.reached.len()) as f64).sum();
-        let fits: f64 = rings.iter().map(|ring| ring.reached.len() as f64).sum::<f64>() * self.width as f64 * 20.0;
-        let tiles = tiles(rings);
-        // Input pixels of all tiles, of the rings that the middle output ring reaches.
-        let middle = &rings[rings.len() / 2];
-        let share = 1.0 + rings.len() as f64 / middle.reached.len().max(1) as f64;
-        let of_ring = |r: &Reached| (FRAC_PI_2 / tiles as f64 + 2.0 * r.half_width) / r.phi.1 * tiles as f64;
-        let pixels: f64 = middle.reached.iter().map(of_ring).sum::<f64>() * share;
-        pairs * (3.0 + 0.12 * self.width as f64) + pixels * 0.6 * self.width as f64 + fits
+    fn with(terms: Vec<Terms>, width: f64, pairs: usize) -> Plan {
+        let ranks = terms.into_iter().map(|terms| Rank { factors: vec![0.0; 2 * terms.count() * pairs], terms });
+        Plan { ranks: ranks.collect(), fits: vec![None; pairs], error: 0.0, width }
     }
+
+    /// How the block's windows are summed.
+    pub(super) fn ways(&self, block: &Block<'_>) -> Ways {
+        let terms = self.ranks.iter().map(|rank| rank.terms.count()).max().unwrap_or(0);
+        let mut ways = Ways { error: self.error, terms, ..Ways::default() };
+        for (pair, met) in self.fits.iter().enumerate() {
+            let pixels = 4 * block.output[pair % block.output.len()].in_quadrant;
+            match met {
+                Some(true) => ways.prefix += pixels,
+                Some(false) => ways.missed += pixels,
+                None => (),
+            }
+        }
+        ways
+    }
+}
+
+impl Rank {
+    /// Fits a pair and tells the error.
+    fn fit(&mut self, pair: usize, transport: &RingTransport) -> f64 {
+        let n = self.terms.count();
+        let (re, im) = self.factors[2 * n * pair..][..2 * n].split_at_mut(n);
+        let error = self.terms.fit(transport, re);
+        im.copy_from_slice(re);
+        error
+    }
+}
+
+/// Pairs by which the block's phases are judged: those of its outermost and middle rings.
+fn sample(block: &Block<'_>) -> Vec<RingTransport> {
+    let n = block.rings.len();
+    let mut sample = Vec::new();
+    for ring in [0, n / 2, n - 1] {
+        let reaching: Vec<_> = block.reaching(block.rings.start + ring).map(|(_, _, r)| r.transport).collect();
+        let last = reaching.len().saturating_sub(1);
+        sample.extend([0, last / 2, last].iter().filter_map(|&i| reaching.get(i)));
+    }
+    sample
+}
+
+/// Nanoseconds, about, that adding the block to a quadrant takes directly.
+fn direct_cost(block: &Block<'_>, layout: &Layout) -> f64 {
+    let pixel = 1.0 + 0.3 * layout.first_rank as f64 + 0.7 * layout.ranks.len() as f64;
+    let pair =
+        |(ring, r): (&OutputRing, &Reached)| ring.in_quadrant as f64 * (2.0 * r.half_width / r.phi.1 * pixel + 30.0);
+    block.pairs().map(pair).sum()
+}
+
+/// The same from prefix sums with so many terms for all ranks.
+fn cost(block: &Block<'_>, layout: &Layout, terms: usize, width: f64) -> f64 {
+    let (terms, plain) = (terms as f64, layout.first_rank as f64);
+    let tiles = tiles(block.output) as f64;
+    let pixels = |i: usize| {
+        let (_, _, reached) = block.reaching(i).next()?;
+        Some((FRAC_PI_2 + 2.0 * width * tiles) / reached.phi.1)
+    };
+    let pixels: f64 = block.rings.clone().filter_map(pixels).sum();
+    let pairs = block.pairs().map(|(ring, _)| ring.in_quadrant).sum::<usize>() as f64;
+    let windows = block.output.iter().map(|ring| ring.in_quadrant).sum::<usize>() as f64;
+    let fits = block.pairs().count() as f64 / 4.0;
+    pairs * (1.0 + 0.4 * plain + 0.3 * terms)
+        + pixels * (1.0 + plain + 0.6 * terms)
+        + windows * (2.0 + plain + 2.0 * terms)
+        + fits * 60.0 * terms
 }
 
 /// Parts of a quadrant.
@@ -148,303 +153,446 @@ fn tiles(rings: &[OutputRing]) -> usize {
     rings.iter().map(|ring| ring.in_quadrant).max().unwrap_or(1).div_ceil(TILE)
 }
 
-impl Terms {
-    fn new(rank: u32, width: f64, sample: &[RingTransport], tolerance: f64) -> Option<Terms> {
-        // The local frequency of e^{isδ(x)} lies between those at x = 0 and at the window's edge.
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for transport in sample {
-            for x in [0.0, width] {
-                let frequency = f64::from(rank) * transport.rate(x);
-                (low, high) = (low.min(frequency), high.max(frequency));
-            }
+/// Adds a block of input rings to the windows about the pixels of one quadrant of a group's rings.
+///
+/// Longitudes are counted from the quadrant's own meridian, as in the direct sum.
+pub(super) fn add(block: &Block<'_>, quadrant: usize, layout: &Layout, plan: &Plan, sums: &mut [Sums]) {
+    for number in block.rings.clone() {
+        let fits = plan.fits_of(block, number);
+        for (i, ring, reached) in block.reaching(number).filter(|(i, ..)| fits[*i] == Some(false)) {
+            direct::add_ring(ring, reached, quadrant, block.band.moments(number), layout, &mut sums[i]);
         }
-        let middle = if width < PI { (low + high) / 2.0 } else { ((low + high) / 2.0).round() };
-        for terms in TERMS {
-            let spread = (high - low) / (terms - 1) as f64;
-            for spacing in [spread.max(0.02 / width), 0.75 / width, 1.0] {
-                if spacing * width > PI || !spacing.is_finite() {
-                    continue;
-                }
-                let set = Terms::with(rank, width, middle, spacing, terms);
-                let mut coefficients = vec![0.0; terms];
-                let worst = sample.iter().map(|t| set.fit(t, &mut coefficients)).fold(0.0, f64::max);
-                if worst < tolerance / 2.0 {
-                    return Some(set);
-                }
-            }
-        }
-        None
     }
-
-    fn with(rank: u32, width: f64, middle: f64, spacing: f64, terms: usize) -> Terms {
-        let offsets: Vec<f64> = (0..terms).map(|k| (k as f64 - ((terms - 1) / 2) as f64) * spacing).collect();
-        let node = |x: f64| Node {
-            cos: x.cos(),
-            sin: x.sin(),
-            back: Complex64::cis(-middle * x),
-            terms: offsets.iter().map(|o| Complex64::cis(o * x)).collect(),
-        };
-        // Chebyshev nodes in −width..width; phases at −x are those at x conjugated.
-        let chebyshev = |n: usize, of: usize| width * (PI * n as f64 / of as f64).cos();
-        let nodes: Vec<Node> = (0..terms).map(|n| node(chebyshev(2 * n + 1, 4 * terms))).collect();
-        let checks = (0..=terms).map(|n| node(chebyshev(n, 2 * terms))).collect();
-        let design = DMatrix::from_fn(2 * terms, terms, |row, k| {
-            if row < terms { nodes[row].terms[k].re } else { nodes[row - terms].terms[k].im }
-        });
-        let largest = design.clone().singular_values().max();
-        let fit = design.pseudo_inverse(SINGULAR * largest).unwrap_or_else(|_| DMatrix::zeros(terms, 2 * terms));
-        Terms { rank, frequencies: offsets.iter().map(|o| middle + o).collect(), fit, nodes, checks }
+    let tiles = tiles(block.output);
+    let mut tile = Tile::new(layout, plan);
+    for t in 0..tiles {
+        let part = |n: usize| (t * n).div_ceil(tiles)..((t + 1) * n).div_ceil(tiles);
+        tile.parts = block.output.iter().map(|ring| part(ring.in_quadrant)).collect();
+        tile.add(block, quadrant, layout, plan, sums);
     }
-
-    /// The c_k of a pair of rings, and the fit's largest error.
-    fn fit(&self, transport: &RingTransport, coefficients: &mut [f64]) -> f64 {
-        let phase = |node: &Node| transport.phase(node.cos, node.sin).powu(self.rank) * node.back;
-        let terms = self.nodes.len();
-        coefficients.fill(0.0);
-        for (n, node) in self.nodes.iter().enumerate() {
-            let phase = phase(node);
-            for (k, c) in coefficients.iter_mut().enumerate() {
-                *c += self.fit[(k, n)] * phase.re + self.fit[(k, terms + n)] * phase.im;
-            }
-        }
-        let error = |node: &Node| {
-            let fitted: Complex64 = node.terms.iter().zip(coefficients.iter()).map(|(t, c)| t * c).sum();
-            (fitted - phase(node)).norm()
-        };
-        self.checks.iter().map(error).fold(0.0, f64::max)
-    }
-}
-
-/// Windows about the pixels of one quadrant of each of a group's rings.
-pub(super) fn sums(
-    rings: &[OutputRing],
-    quadrant: usize,
-    band: &Band,
-    layout: &Layout,
-    plan: &Plan,
-) -> (Vec<Sums>, Ways) {
-    let terms = plan.ranks.iter().map(|t| t.frequencies.len()).max().unwrap_or(0);
-    let mut ways = Ways { terms, ..Ways::default() };
-    let mut sums: Vec<Sums> = rings.iter().map(|ring| Sums::new(ring.in_quadrant, layout.rows)).collect();
-    // The fits of all pairs; those that miss the tolerance are left to the direct sum.
-    let mut coefficients: Vec<Vec<Option<Vec<f64>>>> = Vec::new();
-    for (ring, sums) in rings.iter().zip(&mut sums) {
-        let mut of_ring = Vec::with_capacity(ring.reached.len());
-        for reached in &ring.reached {
-            let (fitted, error) = plan.coefficients(&reached.transport, layout);
-            if error <= plan.tolerance {
-                ways.prefix += ring.in_quadrant;
-                ways.error = ways.error.max(error);
-                of_ring.push(Some(fitted));
-            } else {
-                ways.direct += ring.in_quadrant;
-                direct::add_ring(ring, reached, 0..ring.in_quadrant, quadrant, band, layout, sums);
-                of_ring.push(None);
-            }
-        }
-        coefficients.push(of_ring);
-    }
-    let tiles = tiles(rings);
-    for tile in 0..tiles {
-        let part = |ring: &OutputRing| {
-            (tile * ring.in_quadrant).div_ceil(tiles)..((tile + 1) * ring.in_quadrant).div_ceil(tiles)
-        };
-        add_tile(rings, part, quadrant, band, layout, plan, &coefficients, &mut sums);
-    }
-    (sums, ways)
 }
 
 impl Plan {
-    /// Factors of a pair's prefix sums, and the largest error of its phases.
-    fn coefficients(&self, transport: &RingTransport, layout: &Layout) -> (Vec<f64>, f64) {
-        let mut all = vec![1.0; layout.first_rank.next_multiple_of(LANES)];
-        let mut worst: f64 = 0.0;
-        for terms in &self.ranks {
-            let n = terms.frequencies.len();
-            let mut c = vec![0.0; n];
-            worst = worst.max(terms.fit(transport, &mut c));
-            all.extend_from_slice(&c);
-            all.extend_from_slice(&c);
-        }
-        (all, worst)
+    fn fits_of(&self, block: &Block<'_>, ring: usize) -> &[Option<bool>] {
+        let n = block.output.len();
+        &self.fits[(ring - block.rings.start) * n..][..n]
     }
 }
 
-/// Adds the windows about a part of each ring's quadrant, input ring by input ring.
-#[allow(clippy::too_many_arguments)]
-fn add_tile(
-    rings: &[OutputRing],
-    part: impl Fn(&OutputRing) -> Range<usize>,
-    quadrant: usize,
-    band: &Band,
-    layout: &Layout,
-    plan: &Plan,
-    coefficients: &[Vec<Option<Vec<f64>>>],
-    sums: &mut [Sums],
-) {
-    let parts: Vec<Range<usize>> = rings.iter().map(&part).collect();
-    let occupied = || rings.iter().zip(&parts).filter(|(_, part)| !part.is_empty());
-    let west = occupied().map(|(ring, part)| ring.phi_of(part.start)).fold(f64::INFINITY, f64::min);
-    let east = occupied().map(|(ring, part)| ring.phi_of(part.end - 1)).fold(f64::NEG_INFINITY, f64::max);
-    if west > east {
-        return;
-    }
-    let middle = (west + east) / 2.0;
-    let width = plan.width / LANES;
-    let mut totals: Vec<Vec<[f64; LANES]>> = parts.iter().map(|part| vec![[0.0; LANES]; part.len() * width]).collect();
-    let mut prefix: Vec<[f64; LANES]> = Vec::new();
-    let mut spans: Vec<(u32, u32)> = Vec::new();
-    let first = rings.iter().filter_map(|ring| ring.reached.first()).map(|r| r.number).min();
-    let last = rings.iter().filter_map(|ring| ring.reached.last()).map(|r| r.number).max();
-    for number in first.unwrap_or(1)..=last.unwrap_or(0) {
-        let reached_by = |ring: &OutputRing| {
-            let at = number.checked_sub(ring.reached.first()?.number)?;
-            ring.reached.get(at).map(|r| (at, *r))
-        };
-        let Some((_, widest)) =
-            rings.iter().filter_map(reached_by).max_by(|a, b| a.1.half_width.total_cmp(&b.1.half_width))
-        else {
-            continue;
-        };
-        // Prefix sums from one pixel west of all windows to one east.
-        let (from, _) = widest.span(west);
-        let (_, to) = widest.span(east);
-        let (from, to) = (from - 1, to + 1);
-        fill(&mut prefix, band, layout, plan, &widest, from..to, quadrant, middle);
-        for (i, ring) in rings.iter().enumerate() {
-            let Some((at, reached)) = reached_by(ring) else { continue };
-            let Some(factors) = &coefficients[i][at] else { continue };
-            spans.clear();
-            for k in parts[i].clone() {
-                let (a, b) = reached.span(ring.phi_of(k));
-                let b = b.max(a);
-                sums[i].pixels[k] += (b - a) as usize;
-                spans.push(((a - from) as u32, (b - from) as u32));
-            }
-            add(&prefix, width, &spans, factors, &mut totals[i]);
+/// Some pixels of each output ring, and what is needed to sum their windows.
+#[derive(Default)]
+struct Tile {
+    /// The pixels of each ring's quadrant.
+    parts: Vec<Range<usize>>,
+    /// For each plain row the prefix sums along an input ring, and for each output ring the windows' sums.
+    plain: Vec<(Vec<f64>, Vec<Vec<f64>>)>,
+    /// The pixels of that ring within each window, counted from the first prefix sum.
+    spans: Spans,
+    ranks: Vec<TileRank>,
+}
+
+/// The same for one rank. Numbers come in sets, for each term a real part, then for each an imaginary part.
+#[derive(Default)]
+struct TileRank {
+    /// Prefix sums along an input ring of P e^{i m_k φ}.
+    prefix: Vec<f64>,
+    /// For each output ring Σ c_k (differences of prefix sums), a set for each pixel.
+    totals: Vec<Vec<f64>>,
+    /// e^{i m_k φ} at pixels of the input rings.
+    phases: Phases,
+    /// The same, conjugated, of the output rings.
+    back: Phases,
+}
+
+/// e^{i m_k (φ − middle)} at consecutive pixels of the last two kinds of rings asked for, of which the belt has no more.
+#[derive(Default)]
+struct Phases([KindPhases; 2]);
+
+#[derive(Default)]
+struct KindPhases {
+    /// Longitude of the first pixel and distance to the next, counted from the middle, and the number of pixels.
+    pixels: (f64, f64, usize),
+    /// A set for each pixel.
+    sets: Vec<f64>,
+}
+
+impl Phases {
+    fn at(&mut self, pixels: (f64, f64, usize), frequencies: &[f64]) -> &[f64] {
+        let [last, other] = &mut self.0;
+        if last.pixels != pixels {
+            std::mem::swap(last, other);
         }
+        if last.pixels != pixels {
+            last.pixels = pixels;
+            find_phases(&mut last.sets, frequencies, pixels);
+        }
+        &last.sets
     }
-    for (i, ring) in rings.iter().enumerate() {
-        for (k, totals) in parts[i].clone().zip(totals[i].chunks_exact(width)) {
-            let totals = totals.as_flattened();
-            let dphi = middle - ring.phi_of(k);
-            let sums = sums[i].of(k, 0);
-            (0..layout.first_rank).for_each(|row| sums[row] += totals[row]);
-            let mut at = layout.first_rank.next_multiple_of(LANES);
-            for (rank, terms) in plan.ranks.iter().enumerate() {
-                let n = terms.frequencies.len();
-                let mut psi = Complex64::ZERO;
-                for (k, m) in terms.frequencies.iter().enumerate() {
-                    psi += Complex64::new(totals[at + k], totals[at + n + k]) * Complex64::cis(m * dphi);
+}
+
+/// Ranges of prefix sums, from..to, of consecutive windows.
+#[derive(Default)]
+struct Spans {
+    from: Vec<u32>,
+    to: Vec<u32>,
+}
+
+impl Tile {
+    fn new(layout: &Layout, plan: &Plan) -> Self {
+        let ranks = plan.ranks.iter().map(|_| TileRank::default());
+        Tile { plain: vec![Default::default(); layout.first_rank], ranks: ranks.collect(), ..Tile::default() }
+    }
+
+    /// Adds the block to the windows about the tile's pixels, input ring by input ring.
+    fn add(&mut self, block: &Block<'_>, quadrant: usize, layout: &Layout, plan: &Plan, sums: &mut [Sums]) {
+        let occupied = || block.output.iter().zip(&self.parts).filter(|(_, part)| !part.is_empty());
+        let west = occupied().map(|(ring, part)| ring.phi_of(part.start)).fold(f64::INFINITY, f64::min);
+        let east = occupied().map(|(ring, part)| ring.phi_of(part.end - 1)).fold(f64::NEG_INFINITY, f64::max);
+        if west > east {
+            return;
+        }
+        let middle = (west + east) / 2.0;
+        let empty = |totals: &mut Vec<Vec<f64>>, set: usize| {
+            totals.resize(self.parts.len(), Vec::new());
+            for (totals, part) in totals.iter_mut().zip(&self.parts) {
+                totals.clear();
+                totals.resize(part.len() * set, 0.0);
+            }
+        };
+        self.plain.iter_mut().for_each(|(_, totals)| empty(totals, 1));
+        for (of, rank) in self.ranks.iter_mut().zip(&plan.ranks) {
+            empty(&mut of.totals, 2 * rank.terms.count());
+            (of.phases, of.back) = Default::default();
+        }
+        for number in block.rings.clone() {
+            let fits = plan.fits_of(block, number);
+            let met = || block.reaching(number).filter(|(i, ..)| fits[*i] == Some(true));
+            let Some((_, _, widest)) = met().max_by(|a, b| a.2.half_width.total_cmp(&b.2.half_width)) else { continue };
+            // Prefix sums from one pixel west of all windows to one east.
+            let (from, to) = (widest.span(west).0 - 1, widest.span(east).1 + 1);
+            // The same for all rings of this kind in the block.
+            let all = Reached { half_width: plan.width, ..*widest };
+            let all = all.span(west).0.min(from) - 1..all.span(east).1.max(to) + 1;
+            let moments = block.band.moments(number);
+            let columns =
+                Columns { first: widest.column(from, quadrant), pixels: (to - from) as usize, len: widest.len };
+            for (row, (prefix, _)) in self.plain.iter_mut().enumerate() {
+                fill_plain(prefix, moments.row(row), columns);
+            }
+            for (rank, (of, plan)) in self.ranks.iter_mut().zip(&plan.ranks).enumerate() {
+                of.fill(moments, layout.first_rank + 2 * rank, columns, widest, from, &all, middle, &plan.terms);
+            }
+            for (i, ring, reached) in met() {
+                let part = self.parts[i].clone();
+                self.spans.find(ring, reached, part.clone(), from, &mut sums[i].pixels[part.clone()]);
+                for (prefix, totals) in &mut self.plain {
+                    add_plain(&self.spans, prefix, &mut totals[i]);
                 }
-                sums[layout.first_rank + 2 * rank] += psi.re;
-                sums[layout.first_rank + 2 * rank + 1] += psi.im;
-                at += 2 * n;
+                let pair = (number - block.rings.start) * block.output.len() + i;
+                for (of, plan) in self.ranks.iter_mut().zip(&plan.ranks) {
+                    let set = 2 * plan.terms.count();
+                    add_spans(set, &self.spans, &of.prefix, &plan.factors[set * pair..][..set], &mut of.totals[i]);
+                }
             }
         }
-    }
-}
-
-/// Prefix sums along a stretch of an input ring, with phases counted from longitude `middle`.
-#[allow(clippy::too_many_arguments)]
-#[multiversion::multiversion(targets = "simd")]
-fn fill(
-    prefix: &mut Vec<[f64; LANES]>,
-    band: &Band,
-    layout: &Layout,
-    plan: &Plan,
-    ring: &Reached,
-    stretch: Range<isize>,
-    quadrant: usize,
-    middle: f64,
-) {
-    let moments = band.ring(ring.number);
-    let lanes = plan.width / LANES;
-    let plain = layout.first_rank.div_ceil(LANES);
-    prefix.clear();
-    prefix.resize((stretch.len() + 1) * lanes, [0.0; LANES]);
-    // e^{i m_k (φ − middle)} and its step from pixel to pixel, for each rank: real parts, then imaginary parts.
-    let of = |angle: f64| -> Vec<[f64; LANES]> {
-        let mut all = Vec::with_capacity(lanes - plain);
-        for terms in &plan.ranks {
-            let cis = |m: &f64| Complex64::cis(m * angle);
-            all.extend(terms.frequencies.as_chunks::<LANES>().0.iter().map(|m| std::array::from_fn(|k| cis(&m[k]).re)));
-            all.extend(terms.frequencies.as_chunks::<LANES>().0.iter().map(|m| std::array::from_fn(|k| cis(&m[k]).im)));
+        for (row, (_, totals)) in self.plain.iter().enumerate() {
+            for ((sums, totals), part) in sums.iter_mut().zip(totals).zip(&self.parts) {
+                let windows = sums.data.chunks_exact_mut(sums.rows).skip(part.start);
+                windows.zip(totals).for_each(|(window, total)| window[row] += total);
+            }
         }
-        all
-    };
-    let (mut phases, steps) = (of(ring.phi_of(stretch.start) - middle), of(ring.phi.1));
-    let mut column = ring.column(stretch.start, quadrant);
-    for pixel in 0..stretch.len() {
-        let (before, after) = prefix.split_at_mut((pixel + 1) * lanes);
-        let (before, after) = (&before[pixel * lanes..], &mut after[..lanes]);
-        after.copy_from_slice(before);
-        for row in 0..layout.first_rank {
-            after[row / LANES][row % LANES] += moments.row(row)[column];
-        }
-        let mut at = 0;
-        for (rank, terms) in plan.ranks.iter().enumerate() {
+        // Back to each window's own longitude.
+        for (rank, (of, plan)) in self.ranks.iter_mut().zip(&plan.ranks).enumerate() {
             let row = layout.first_rank + 2 * rank;
-            let (re, im) = (moments.row(row)[column], moments.row(row + 1)[column]);
-            let n = terms.frequencies.len() / LANES;
-            let (cos, sin) = phases[at..at + 2 * n].split_at_mut(n);
-            let (step_cos, step_sin) = steps[at..at + 2 * n].split_at(n);
-            let (to_re, to_im) = after[plain + at..plain + at + 2 * n].split_at_mut(n);
-            for c in 0..n {
-                for k in 0..LANES {
-                    let (u, v) = (cos[c][k], sin[c][k]);
-                    to_re[c][k] += re * u - im * v;
-                    to_im[c][k] += re * v + im * u;
-                    cos[c][k] = u * step_cos[c][k] - v * step_sin[c][k];
-                    sin[c][k] = u * step_sin[c][k] + v * step_cos[c][k];
-                }
+            for (i, ring) in block.output.iter().enumerate() {
+                let part = &self.parts[i];
+                let Some(west) = part.clone().next().map(|k| ring.phi_of(k)) else { continue };
+                let sets = of.back.at((middle - west, -ring.phi.1, part.len()), &plan.terms.frequencies);
+                let rows = sums[i].rows;
+                let windows = sums[i].data[part.start * rows + row..].chunks_mut(rows);
+                turn_back(2 * plan.terms.count(), &of.totals[i], sets, windows);
             }
-            at += 2 * n;
-        }
-        column += 1;
-        if column == ring.len {
-            column = 0;
         }
     }
 }
 
-/// Adds factors times the differences of prefix sums over each span.
+/// A stretch of a ring, which may go on from its end to its beginning.
+#[derive(Clone, Copy)]
+struct Columns {
+    first: usize,
+    pixels: usize,
+    len: usize,
+}
+
+impl Columns {
+    /// Its places in the ring, in order.
+    #[inline(always)]
+    fn ranges(self) -> impl Iterator<Item = Range<usize>> {
+        let (mut at, mut left) = (self.first, self.pixels);
+        std::iter::from_fn(move || {
+            let range = at..(at + left).min(self.len);
+            left -= range.len();
+            at = 0;
+            (!range.is_empty()).then_some(range)
+        })
+    }
+}
+
+fn fill_plain(prefix: &mut Vec<f64>, row: &[f64], columns: Columns) {
+    prefix.clear();
+    let mut sum = 0.0;
+    prefix.push(sum);
+    for range in columns.ranges() {
+        prefix.extend(row[range].iter().map(|value| {
+            sum += value;
+            sum
+        }));
+    }
+}
+
+impl TileRank {
+    #[allow(clippy::too_many_arguments)]
+    fn fill(
+        &mut self,
+        moments: &RingMoments,
+        row: usize,
+        columns: Columns,
+        ring: &Reached,
+        from: isize,
+        all: &Range<isize>,
+        middle: f64,
+        terms: &Terms,
+    ) {
+        let set = 2 * terms.count();
+        let pixels = (ring.phi_of(all.start) - middle, ring.phi.1, all.len());
+        let sets = self.phases.at(pixels, &terms.frequencies);
+        let sets = &sets[(from - all.start) as usize * set..][..columns.pixels * set];
+        self.prefix.resize((columns.pixels + 1) * set, 0.0);
+        fill(set, &mut self.prefix, moments.row(row), moments.row(row + 1), columns, sets);
+    }
+}
+
+impl Spans {
+    /// Finds the pixels, counted from `first`, of an input ring in the windows about these pixels of an output ring, and
+    /// adds their numbers to `pixels`.
+    fn find(&mut self, ring: &OutputRing, reached: &Reached, part: Range<usize>, first: isize, pixels: &mut [u64]) {
+        self.from.resize(part.len(), 0);
+        self.to.resize(part.len(), 0);
+        match ring.stride(reached) {
+            Some(stride) => {
+                let (from, to) = reached.span(ring.phi_of(0));
+                let shift = (part.start * stride) as isize - first;
+                let (from, to) = ((from + shift) as u32, (to.max(from) + shift) as u32);
+                fill_evenly(self, from, to, stride as u32, pixels);
+            }
+            None => find_each(self, ring, reached, part, first, pixels),
+        }
+    }
+}
+
 #[multiversion::multiversion(targets = "simd")]
-fn add(prefix: &[[f64; LANES]], width: usize, spans: &[(u32, u32)], factors: &[f64], totals: &mut [[f64; LANES]]) {
-    let factors = factors.as_chunks::<LANES>().0;
-    match width {
-        1 => add_lanes::<1>(prefix, spans, factors, totals),
-        2 => add_lanes::<2>(prefix, spans, factors, totals),
-        3 => add_lanes::<3>(prefix, spans, factors, totals),
-        4 => add_lanes::<4>(prefix, spans, factors, totals),
-        5 => add_lanes::<5>(prefix, spans, factors, totals),
-        _ => {
-            for (&(from, to), total) in spans.iter().zip(totals.chunks_exact_mut(width)) {
-                let (a, b) = (&prefix[from as usize * width..], &prefix[to as usize * width..]);
-                for c in 0..width {
-                    (0..LANES).for_each(|k| total[c][k] += factors[c][k] * (b[c][k] - a[c][k]));
-                }
+fn fill_evenly(spans: &mut Spans, from: u32, to: u32, stride: u32, pixels: &mut [u64]) {
+    for (k, span) in spans.from.iter_mut().enumerate() {
+        *span = from + k as u32 * stride;
+    }
+    for (k, span) in spans.to.iter_mut().enumerate() {
+        *span = to + k as u32 * stride;
+    }
+    for pixels in pixels {
+        *pixels += u64::from(to - from);
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn find_each(
+    spans: &mut Spans,
+    ring: &OutputRing,
+    reached: &Reached,
+    part: Range<usize>,
+    first: isize,
+    pixels: &mut [u64],
+) {
+    for (((span_from, span_to), pixels), k) in spans.from.iter_mut().zip(&mut spans.to).zip(pixels).zip(part) {
+        let (from, to) = reached.span(ring.phi_of(k));
+        let to = to.max(from);
+        (*span_from, *span_to) = ((from - first) as u32, (to - first) as u32);
+        *pixels += (to - from) as u64;
+    }
+}
+
+/// Runs a kernel written for a set size known to the compiler.
+macro_rules! for_set {
+    ($set:expr, $kernel:ident($($argument:expr),*)) => {
+        match $set {
+            8 => $kernel::<4, 8>($($argument),*),
+                16 => $kernel::<8, 16>($($argument),*),
+            24 => $kernel::<12, 24>($($argument),*),
+            32 => $kernel::<16, 32>($($argument),*),
+            48 => $kernel::<24, 48>($($argument),*),
+            set => unreachable!("no set has {set} numbers"),
+        }
+    };
+}
+
+/// Prefix sums of the complex numbers re + i im times the phases.
+#[multiversion::multiversion(targets = "simd")]
+fn fill(set: usize, prefix: &mut [f64], re: &[f64], im: &[f64], columns: Columns, phases: &[f64]) {
+    for_set!(set, fill_sets(prefix, re, im, columns, phases))
+}
+
+#[inline(always)]
+fn fill_sets<const K: usize, const SET: usize>(
+    prefix: &mut [f64],
+    re: &[f64],
+    im: &[f64],
+    columns: Columns,
+    phases: &[f64],
+) {
+    let [first, rest @ ..] = prefix.as_chunks_mut::<SET>().0 else { return };
+    let mut sum = [0.0; SET];
+    *first = sum;
+    let mut done = 0;
+    for range in columns.ranges() {
+        let n = range.len();
+        let phases = &phases.as_chunks::<SET>().0[done..done + n];
+        let values = re[range.clone()].iter().zip(&im[range]);
+        for (((re, im), phase), prefix) in values.zip(phases).zip(&mut rest[done..done + n]) {
+            for k in 0..K {
+                let (u, v) = (phase[k], phase[K + k]);
+                sum[k] += re * u - im * v;
+                sum[K + k] += re * v + im * u;
+            }
+            *prefix = sum;
+        }
+        done += n;
+    }
+}
+
+/// Adds the differences of prefix sums over each span.
+#[multiversion::multiversion(targets = "simd")]
+fn add_plain(spans: &Spans, prefix: &[f64], totals: &mut [f64]) {
+    for ((&from, &to), total) in spans.from.iter().zip(&spans.to).zip(totals) {
+        *total += prefix[to as usize] - prefix[from as usize];
+    }
+}
+
+fn add_spans(set: usize, spans: &Spans, prefix: &[f64], factors: &[f64], totals: &mut [f64]) {
+    Arch::new().dispatch(AddSpans { set, spans, prefix, factors, totals });
+}
+
+/// Adds factors times the differences of prefix sums over each span. Written with explicit vectors: left to itself, the
+/// compiler reads several sets at a time, number by number.
+struct AddSpans<'a> {
+    set: usize,
+    spans: &'a Spans,
+    prefix: &'a [f64],
+    factors: &'a [f64],
+    totals: &'a mut [f64],
+}
+
+impl WithSimd for AddSpans<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match self.set / S::F64_LANES {
+            1 => self.add::<S, 1>(simd),
+            2 => self.add::<S, 2>(simd),
+            3 => self.add::<S, 3>(simd),
+            4 => self.add::<S, 4>(simd),
+            6 => self.add::<S, 6>(simd),
+            8 => self.add::<S, 8>(simd),
+            12 => self.add::<S, 12>(simd),
+            16 => self.add::<S, 16>(simd),
+            24 => self.add::<S, 24>(simd),
+            32 => self.add::<S, 32>(simd),
+            _ => self.add::<S, 48>(simd),
+        }
+    }
+}
+
+impl AddSpans<'_> {
+    #[inline(always)]
+    fn add<S: Simd, const N: usize>(self, simd: S) {
+        let sets = |values| S::as_simd_f64s(values).0.as_chunks::<N>().0;
+        let (factors, prefix) = (&sets(self.factors)[0], sets(self.prefix));
+        let totals = S::as_mut_simd_f64s(self.totals).0.as_chunks_mut::<N>().0;
+        for ((&from, &to), total) in self.spans.from.iter().zip(&self.spans.to).zip(totals) {
+            let (from, to) = (&prefix[from as usize], &prefix[to as usize]);
+            for k in 0..N {
+                total[k] = simd.mul_add_f64s(factors[k], simd.sub_f64s(to[k], from[k]), total[k]);
             }
         }
     }
 }
 
-/// The same for a width known to the compiler.
+/// e^{i m_k φ} for so many longitudes φ = start, start + step, …: a set for each.
+#[multiversion::multiversion(targets = "simd")]
+fn find_phases(sets: &mut Vec<f64>, frequencies: &[f64], (start, step, count): (f64, f64, usize)) {
+    let set = 2 * frequencies.len();
+    sets.resize(count * set, 0.0);
+    for_set!(set, find_phase_sets(sets, frequencies, start, step))
+}
+
 #[inline(always)]
-fn add_lanes<const WIDTH: usize>(
-    prefix: &[[f64; LANES]],
-    spans: &[(u32, u32)],
-    factors: &[[f64; LANES]],
-    totals: &mut [[f64; LANES]],
-) {
-    let (prefix, totals) = (prefix.as_chunks::<WIDTH>().0, totals.as_chunks_mut::<WIDTH>().0);
-    let factors = &factors.as_chunks::<WIDTH>().0[0];
-    for (&(from, to), total) in spans.iter().zip(totals) {
-        let (a, b) = (&prefix[from as usize], &prefix[to as usize]);
-        for c in 0..WIDTH {
-            for k in 0..LANES {
-                total[c][k] += factors[c][k] * (b[c][k] - a[c][k]);
-            }
+fn find_phase_sets<const K: usize, const SET: usize>(sets: &mut [f64], frequencies: &[f64], start: f64, step: f64) {
+    /// Sets made side by side.
+    const SIDE: usize = 8;
+    let cis = |angle: f64| {
+        let mut set = [0.0; SET];
+        for k in 0..K {
+            let phase = Complex64::cis(frequencies[k] * angle);
+            (set[k], set[K + k]) = (phase.re, phase.im);
         }
+        set
+    };
+    let times = |a: &[f64; SET], b: &[f64; SET]| {
+        let mut product = [0.0; SET];
+        for k in 0..K {
+            product[k] = a[k] * b[k] - a[K + k] * b[K + k];
+            product[K + k] = a[k] * b[K + k] + a[K + k] * b[k];
+        }
+        product
+    };
+    let sets = sets.as_chunks_mut::<SET>().0;
+    let mut power = cis(step);
+    let mut known = sets.len().min(1);
+    if known == 1 {
+        sets[0] = cis(start);
+    }
+    while known < SIDE && known < sets.len() {
+        let (old, new) = sets.split_at_mut(known);
+        for (new, old) in new.iter_mut().zip(&*old) {
+            *new = times(old, &power);
+        }
+        known *= 2;
+        power = times(&power, &power);
+    }
+    for i in SIDE..sets.len() {
+        sets[i] = times(&sets[i - SIDE], &power);
+    }
+}
+
+/// Adds to real and imaginary part, the first two numbers of each window, the sum of its terms, each times its phase.
+#[multiversion::multiversion(targets = "simd")]
+fn turn_back(set: usize, totals: &[f64], phases: &[f64], windows: std::slice::ChunksMut<'_, f64>) {
+    for_set!(set, turn_sets_back(totals, phases, windows))
+}
+
+#[inline(always)]
+fn turn_sets_back<const K: usize, const SET: usize>(
+    totals: &[f64],
+    phases: &[f64],
+    windows: std::slice::ChunksMut<'_, f64>,
+) {
+    let sets = totals.as_chunks::<SET>().0.iter().zip(phases.as_chunks::<SET>().0);
+    for ((total, phase), window) in sets.zip(windows) {
+        let (mut re, mut im) = (0.0, 0.0);
+        for k in 0..K {
+            re += total[k] * phase[k] - total[K + k] * phase[K + k];
+            im += total[k] * phase[K + k] + total[K + k] * phase[k];
+        }
+        window[0] += re;
+        window[1] += im;
     }
 }

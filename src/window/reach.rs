@@ -1,8 +1,9 @@
 //! Which pixels of an input ring lie in the windows about an output ring. Both ways of summing ask here.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
-use longan_formats::Healpix;
+use longan_formats::{Healpix, Ring};
 
 use crate::transport::RingTransport;
 
@@ -12,27 +13,28 @@ const EDGE: f64 = 1e-12;
 /// An output ring and the input rings that windows about its pixels reach.
 #[derive(Debug)]
 pub(super) struct OutputRing {
+    /// Its number.
+    pub(super) number: usize,
     /// Colatitude in radians.
     pub(super) theta: f64,
+    ring: Ring,
     /// Pixels in a quadrant of the ring; all that follows is the same in each.
     pub(super) in_quadrant: usize,
     /// Longitude of the first pixel and distance to the next, in radians.
     pub(super) phi: (f64, f64),
-    /// Number of the ring.
-    pub(super) number: usize,
-    /// Input rings reached.
-    pub(super) reached: Vec<Reached>,
+    /// Input rings that may be reached.
+    pub(super) reach: Range<usize>,
 }
 
 /// An input ring that windows about an output ring reach.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reached {
-    /// Number of the ring.
-    pub(super) number: usize,
-    /// Its pixels.
+    /// Pixels of the ring.
     pub(super) len: usize,
     /// Longitude of the first pixel and distance to the next, in radians.
     pub(super) phi: (f64, f64),
+    /// Pixels to a radian.
+    pub(super) per_radian: f64,
     /// Largest |Δφ| within the window, in radians; π for the whole ring.
     pub(super) half_width: f64,
     /// Transport from the ring to the output ring.
@@ -40,35 +42,47 @@ pub(super) struct Reached {
 }
 
 impl OutputRing {
-    /// An output ring and what a radius (radians) reaches from it.
+    /// An output ring and what a radius (radians; 0: the pixel itself) reaches from it.
     pub(super) fn new(input: Healpix, output: Healpix, number: usize, radius: f64) -> Self {
-        let centre = output.ring(number);
-        let reached = rings_within(input, output, number, radius).filter_map(|i| {
-            let ring = input.ring(i);
-            // sin²(d/2) = sin²((θ_x − θ_w)/2) + sin θ_x sin θ_w sin²(Δφ/2), free of cancellation.
-            let half = (radius + EDGE) / 2.0;
-            let beyond = half.sin().powi(2) - ((ring.theta() - centre.theta()) / 2.0).sin().powi(2);
-            let sin_sq = if half < PI / 2.0 { beyond / (ring.sin_theta * centre.sin_theta) } else { 1.0 };
-            (sin_sq >= 0.0).then(|| Reached {
-                number: i,
-                len: ring.len,
-                phi: (ring.phi(0), TAU / ring.len as f64),
-                half_width: if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI },
-                transport: RingTransport::new((ring.sin_theta, ring.cos_theta), (centre.sin_theta, centre.cos_theta)),
-            })
-        });
+        let ring = output.ring(number);
         OutputRing {
-            theta: centre.theta(),
-            in_quadrant: centre.len / 4,
-            phi: (centre.phi(0), TAU / centre.len as f64),
             number,
-            reached: if radius > 0.0 { reached.collect() } else { Vec::new() },
+            theta: ring.theta(),
+            ring,
+            in_quadrant: ring.len / 4,
+            phi: (ring.phi(0), TAU / ring.len as f64),
+            reach: if radius > 0.0 { rings_within(input, ring.theta(), radius) } else { number..number + 1 },
         }
     }
 
+    /// An input ring with its number and colatitude, as seen from here; nothing where it is out of reach.
+    pub(super) fn reached(&self, number: usize, ring: &Ring, theta: f64, radius: f64) -> Option<Reached> {
+        if !self.reach.contains(&number) {
+            return None;
+        }
+        // sin²(d/2) = sin²((θ_x − θ_w)/2) + sin θ_x sin θ_w sin²(Δφ/2), free of cancellation.
+        let half = (radius + EDGE) / 2.0;
+        let beyond = half.sin().powi(2) - ((theta - self.theta) / 2.0).sin().powi(2);
+        let sin_sq = if half < PI / 2.0 { beyond / (ring.sin_theta * self.ring.sin_theta) } else { 1.0 };
+        (sin_sq >= 0.0).then(|| Reached {
+            len: ring.len,
+            phi: (ring.phi(0), TAU / ring.len as f64),
+            per_radian: ring.len as f64 / TAU,
+            half_width: if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI },
+            transport: RingTransport::new((ring.sin_theta, ring.cos_theta), (self.ring.sin_theta, self.ring.cos_theta)),
+        })
+    }
+
     /// Longitude in radians of the `k`-th pixel of the first quadrant.
+    #[inline(always)]
     pub(super) fn phi_of(&self, k: usize) -> f64 {
         self.phi.0 + k as f64 * self.phi.1
+    }
+
+    /// By how many pixels of an input ring the windows about neighbouring pixels differ, where that is a whole number.
+    pub(super) fn stride(&self, ring: &Reached) -> Option<usize> {
+        let pixels = 4 * self.in_quadrant;
+        ring.len.is_multiple_of(pixels).then(|| ring.len / pixels)
     }
 }
 
@@ -77,10 +91,14 @@ impl Reached {
     #[inline(always)]
     pub(super) fn span(&self, phi: f64) -> (isize, isize) {
         let offset = phi - self.phi.0;
-        let floor = |x: f64| (x + 4.0 * self.len as f64) as isize - 4 * self.len as isize;
-        let from = floor((offset - self.half_width) / self.phi.1) + 1;
-        let to = floor((offset + self.half_width) / self.phi.1) + 1;
-        if self.half_width < PI { (from, to.min(from + self.len as isize)) } else { (from, from + self.len as isize) }
+        // Truncation is the floor of what is not negative.
+        let beyond = (4 * self.len) as f64;
+        let floor = |x: f64| (x * self.per_radian + beyond) as isize - 4 * self.len as isize;
+        let from = floor(offset - self.half_width) + 1;
+        let to = floor(offset + self.half_width) + 1;
+        // The whole ring, and never a pixel twice.
+        let limit = from + self.len as isize;
+        (from, if self.half_width < PI { to.min(limit) } else { limit })
     }
 
     /// Longitude in radians of a pixel, counted on beyond either end of the ring.
@@ -96,12 +114,8 @@ impl Reached {
     }
 }
 
-/// The input rings that windows about an output ring may reach.
-pub(super) fn rings_within(input: Healpix, output: Healpix, ring: usize, radius: f64) -> std::ops::Range<usize> {
-    if radius == 0.0 {
-        return ring..ring + 1;
-    }
-    let theta = output.ring(ring).theta();
+/// The input rings that windows of a radius about colatitude `theta` may reach.
+fn rings_within(input: Healpix, theta: f64, radius: f64) -> Range<usize> {
     let first_south_of = |theta: f64| {
         let (mut north, mut south) = (1, input.rings() + 1);
         while north < south {

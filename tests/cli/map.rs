@@ -7,7 +7,7 @@ use super::*;
 
 /// What the library makes of `sky.fits`, possibly masked.
 fn of_library(folder: &Folder, analysis: &Analysis, measures: &[BuiltIn]) -> Vec<Vec<f64>> {
-    analysis.minkowski_maps(&folder.read("sky.fits", "0"), measures, |_| ()).unwrap().values
+    analysis.minkowski_maps(&folder.read("sky.fits", "0"), measures, |_| ()).unwrap().remove(0).values
 }
 
 /// The mask of `sky.fits` in RING order: nothing south of 30° S.
@@ -110,10 +110,10 @@ fn options_reach_the_analysis() {
     let sigma = |text: &str| Analysis { threshold_unit: ThresholdUnit::Sigma, ..value(text) };
     let cases = [
         ("", base.clone()),
-        ("--window 12.5", Analysis { window: 12.5, ..base.clone() }),
-        ("--window 180 --nside-out 2", Analysis { window: 180.0, nside_out: Some(2), ..base.clone() }),
+        ("--window 12.5", Analysis { windows: vec![12.5], ..base.clone() }),
+        ("--window 180 --nside-out 2", Analysis { windows: vec![180.0], nside_out: Some(2), ..base.clone() }),
         ("--nside-out 5", Analysis { nside_out: Some(5), ..base.clone() }),
-        ("--window 0", Analysis { window: 0.0, ..base.clone() }),
+        ("--window 0", Analysis { windows: vec![0.0], ..base.clone() }),
         ("--body below", Analysis { body: Body::Below, ..base.clone() }),
         ("--weight curvature", Analysis { weight: Weight::Curvature, ..base.clone() }),
         ("--thresholds -0.7", value("-0.7")),
@@ -142,7 +142,7 @@ fn options_reach_the_analysis() {
     for (options, max_masked) in [("", 0.0625), ("--max-masked 0.4", 0.4)] {
         folder.done(&format!("map sky.fits -o out.fits --overwrite --mask mask.fits {options}"));
         let analysis = Analysis { max_masked, ..base.clone() };
-        let expected = analysis.minkowski_maps(&map, &measures[..1], |_| ()).unwrap().values;
+        let expected = analysis.minkowski_maps(&map, &measures[..1], |_| ()).unwrap().remove(0).values;
         assert_eq!(difference(folder.read("out.fits", "EVQ").values(), &expected[0]), 0.0);
         let header = &folder.headers("out.fits")[0];
         assert_eq!([&header["MASKFILE"], &header["MASKTHR"]], ["mask.fits", "0.9"]);
@@ -168,7 +168,7 @@ fn a_sequence_has_an_extension_for_each_threshold() {
         let alone = Analysis {
             thresholds: threshold.parse().unwrap(),
             threshold_unit: ThresholdUnit::Value,
-            window: 20.0,
+            windows: vec![20.0],
             ..Analysis::default()
         };
         let expected = of_library(&folder, &alone, &[find("w1").unwrap(), find("evq").unwrap()]);
