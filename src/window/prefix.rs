@@ -46,25 +46,35 @@ struct Rank {
     factors: Vec<f64>,
 }
 
-impl Plan {
-    /// A plan for the block, where prefix sums cost less than the direct sum and meet the tolerance.
-    pub(super) fn new(block: &Block<'_>, layout: &Layout, summation: Summation) -> Option<Plan> {
+/// The way in which a block is to be summed.
+pub(super) enum Way {
+    /// From prefix sums.
+    Prefix(Plan),
+    /// Pixel by pixel, which costs less or is asked for.
+    Direct,
+    /// Pixel by pixel, since no fit meets the tolerance.
+    Missed,
+}
+
+impl Way {
+    /// The cheapest way to meet the tolerance.
+    pub(super) fn find(block: &Block<'_>, layout: &Layout, summation: Summation) -> Way {
         let (tolerance, worthwhile) = match summation {
-            Summation::Exact => return None,
+            Summation::Exact => return Way::Direct,
             Summation::Tolerance(tolerance) => (tolerance, WORTHWHILE),
             Summation::Prefix(tolerance) => (tolerance, f64::INFINITY),
         };
-        let width = block.pairs().map(|(_, r)| r.half_width).max_by(f64::total_cmp)?;
+        let Some(width) = block.pairs().map(|(_, r)| r.half_width).max_by(f64::total_cmp) else { return Way::Direct };
         let budget = if worthwhile.is_finite() { worthwhile * direct_cost(block, layout) } else { f64::INFINITY };
         if cost(block, layout, layout.ranks.len() * fit::FEWEST, width) > budget {
-            return None;
+            return Way::Direct;
         }
         let sample = sample(block);
         let terms: Option<Vec<Terms>> =
             layout.ranks.iter().map(|&rank| Terms::new(rank, width, &sample, tolerance)).collect();
-        let terms = terms?;
+        let Some(terms) = terms else { return Way::Missed };
         if cost(block, layout, terms.iter().map(Terms::count).sum(), width) > budget {
-            return None;
+            return Way::Direct;
         }
         let mut plan = Plan::with(terms, width, block.reached.len());
         for (i, reached) in block.reached.iter().enumerate() {
@@ -75,9 +85,11 @@ impl Plan {
                 plan.error = plan.error.max(error);
             }
         }
-        Some(plan)
+        Way::Prefix(plan)
     }
+}
 
+impl Plan {
     fn with(terms: Vec<Terms>, width: f64, pairs: usize) -> Plan {
         let ranks = terms.into_iter().map(|terms| Rank { factors: vec![0.0; 2 * terms.count() * pairs], terms });
         Plan { ranks: ranks.collect(), fits: vec![None; pairs], error: 0.0, width }

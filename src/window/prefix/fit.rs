@@ -2,6 +2,9 @@
 //!
 //! The frequencies are m_k = m + (k − (K − 1)/2) h/Φ. With u = x/Φ the least-squares problem then depends on K and h
 //! alone, so that its solution is found once for the whole program. What the sums do with a fit is left to others.
+//!
+//! Near a pole, where windows hold most of a ring or all of it, the frequencies are 0, 1, 2, … (0, −1, −2, … in the
+//! south) and Φ is π: with ρ = tan(θ_x/2) tan(θ_w/2) < 1, e^{iδ} = (e^{ix} + ρ)/(1 + ρ e^{ix}), a power series.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -23,8 +26,12 @@ const SPACINGS: usize = 24;
 /// Spacings that are tried for each number of terms.
 const TRIALS: usize = 3;
 
-/// Singular values below this share of the largest are dropped from a fit.
-const SINGULAR: f64 = 1e-13;
+/// Half-widths in radians from which the frequencies of whole rings are tried.
+const WIDE: f64 = 1.5;
+
+/// Singular values below this share of the largest are dropped from a fit: smaller ones amplify rounding more than they
+/// improve it.
+const SINGULAR: f64 = 1e-10;
 
 /// Relative error of a prefix sum's differences that large c_k amplify.
 const ROUNDING: f64 = 1e-14;
@@ -90,16 +97,26 @@ impl Terms {
                 (low, high) = (low.min(frequency), high.max(frequency));
             }
         }
+        let middle = (low + high) / 2.0;
         for (count, &terms) in COUNTS.iter().enumerate() {
+            let meets = |set: &Terms| {
+                let mut c = vec![0.0; terms];
+                sample.iter().all(|t| set.fit(t, &mut c) < tolerance / 2.0)
+            };
+            if width > WIDE {
+                let whole = Terms::with(rank, PI, ((terms - 1) as f64 / 2.0).copysign(middle), count, 0);
+                if meets(&whole) {
+                    return Some(whole);
+                }
+            }
             let ideal = (high - low) * width / (terms - 1) as f64;
             // The smallest spacing that spans them all and does not amplify rounding beyond the tolerance (c_k grow as
             // h^{1 − K}), then wider ones.
             let least = (10.0 * ROUNDING / tolerance).powf(1.0 / (terms - 1) as f64);
             let first = (0..SPACINGS).rev().find(|&s| step(s) >= ideal.max(least)).unwrap_or(0);
             for spacing in (0..=first).rev().take(TRIALS) {
-                let set = Terms::with(rank, width, (low + high) / 2.0, count, spacing);
-                let mut c = vec![0.0; terms];
-                if sample.iter().all(|t| set.fit(t, &mut c) < tolerance / 2.0) {
+                let set = Terms::with(rank, width, middle, count, spacing);
+                if meets(&set) {
                     return Some(set);
                 }
             }
