@@ -76,23 +76,27 @@ impl Way {
         if cost(block, layout, terms.iter().map(Terms::count).sum(), width) > budget {
             return Way::Direct;
         }
-        let mut plan = Plan::with(terms, width, block.reached.len());
-        for (i, reached) in block.reached.iter().enumerate() {
-            let Some(reached) = reached else { continue };
-            let error = plan.ranks.iter_mut().map(|rank| rank.fit(i, &reached.transport)).fold(0.0, f64::max);
-            plan.fits[i] = Some(error <= tolerance);
-            if error <= tolerance {
-                plan.error = plan.error.max(error);
-            }
-        }
-        Way::Prefix(plan)
+        Way::Prefix(Plan::new(terms, width, &block.reached, tolerance))
     }
 }
 
 impl Plan {
-    fn with(terms: Vec<Terms>, width: f64, pairs: usize) -> Plan {
-        let ranks = terms.into_iter().map(|terms| Rank { factors: vec![0.0; 2 * terms.count() * pairs], terms });
-        Plan { ranks: ranks.collect(), fits: vec![None; pairs], error: 0.0, width }
+    /// Fits each pair of an output ring and the input ring that it reaches.
+    fn new(terms: Vec<Terms>, width: f64, pairs: &[Option<Reached>], tolerance: f64) -> Plan {
+        let of_rank = |terms: Terms| Rank { factors: vec![0.0; 2 * terms.count() * pairs.len()], terms };
+        let mut ranks: Vec<Rank> = terms.into_iter().map(of_rank).collect();
+        let mut worst: f64 = 0.0;
+        let mut fit = |(i, reached): (usize, &Option<Reached>)| {
+            let transport = &reached.as_ref()?.transport;
+            let error = ranks.iter_mut().map(|rank| rank.fit(i, transport)).fold(0.0, f64::max);
+            let met = error <= tolerance;
+            if met {
+                worst = worst.max(error);
+            }
+            Some(met)
+        };
+        let fits = pairs.iter().enumerate().map(&mut fit).collect();
+        Plan { fits, error: worst, ranks, width }
     }
 
     /// How the block's windows are summed.
@@ -660,5 +664,36 @@ fn turn_sets_back<const K: usize, const SET: usize>(
         }
         window[0] += re;
         window[1] += im;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use longan_formats::Healpix;
+
+    /// Fits are judged by what they give, whatever they were meant to fit.
+    #[test]
+    fn bad_fits_are_seen() {
+        let (grid, radius) = (Healpix::new(64).unwrap(), 0.1);
+        let output: Vec<OutputRing> = (40..48).map(|i| OutputRing::new(grid, grid, i, radius)).collect();
+        let input = (38..46).map(|i| (i, grid.ring(i)));
+        let pairs: Vec<Option<Reached>> = input
+            .flat_map(|(i, ring)| output.iter().map(move |from| from.reached(i, &ring, ring.theta(), radius)))
+            .collect();
+        let width = pairs.iter().flatten().map(|r| r.half_width).fold(0.0, f64::max);
+        let sample: Vec<RingTransport> = pairs.iter().flatten().map(|r| r.transport).collect();
+        let good = || Terms::new(2, width, &sample, 1e-7).unwrap();
+        let all = |terms: Terms, met: bool| {
+            let plan = Plan::new(vec![terms], width, &pairs, 1e-7);
+            pairs.iter().zip(&plan.fits).all(|(pair, fit)| *fit == pair.map(|_| met)) && (met == (plan.error > 0.0))
+        };
+        assert!(all(good(), true));
+        // The phases of another hemisphere, and of wider windows.
+        let mirrored: Vec<RingTransport> = (200..208)
+            .map(|i| RingTransport::new(grid.ring(i).theta().sin_cos(), grid.ring(i).theta().sin_cos()))
+            .collect();
+        assert!(all(Terms::new(40, width, &mirrored, 1e-7).unwrap().of_rank(2), false));
+        assert!(all(Terms::new(2, 30.0 * width, &sample, 0.1).unwrap(), false));
     }
 }
