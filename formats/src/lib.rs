@@ -19,4 +19,4 @@ pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, UNSEEN, is_bad};
-pub use save::{check_writable, save};
+pub use save::{abandon, check_writable, save};

@@ -285,8 +285,11 @@ fn explained(maps: &MinkowskiMaps) -> String {
     let mut ways = Vec::new();
     let all = (direct + missed + prefix).max(1) as f64;
     let mut way = |pairs: usize, how: String| {
-        if pairs > 0 {
-            ways.push(format!("{} % {how}", decimals(100.0 * pairs as f64 / all, 1)));
+        let percent = 100.0 * pairs as f64 / all;
+        match pairs {
+            0 => (),
+            _ if percent < 0.1 => ways.push(format!("less than 0.1 % {how}")),
+            _ => ways.push(format!("{percent:.1} % {how}")),
         }
     };
     way(prefix, format!("from prefix sums with up to {terms} terms, psi_s to {error:.1e} of W1"));

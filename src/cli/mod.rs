@@ -1,7 +1,8 @@
 //! Commands, one file each, and how they end.
 //!
 //! Exit status: 0 all done; 1 a file could not be read, analysed or written (others of the run may be done); 2 the
-//! arguments make no sense.
+//! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
+//! file.
 
 mod demo;
 mod info;
@@ -48,6 +49,8 @@ enum Command {
 
 /// Runs the program.
 pub(crate) fn main() -> ExitCode {
+    #[cfg(unix)]
+    clean_up_when_stopped();
     let done = match Arguments::parse().command {
         Command::Map(arguments) => map::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
@@ -63,4 +66,18 @@ pub(crate) fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Removes unfinished files when the program is told to end, and then ends it in the way of that signal.
+#[cfg(unix)]
+fn clean_up_when_stopped() {
+    use signal_hook::consts::TERM_SIGNALS;
+    // Without it, as before a file is written, the signals end the program by themselves.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(TERM_SIGNALS) else { return };
+    std::thread::spawn(move || {
+        if let Some(signal) = signals.forever().next() {
+            longan::formats::abandon();
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
+    });
 }
