@@ -31,7 +31,7 @@ const GROUP: usize = 32;
 const BLOCK: usize = 32;
 
 /// Rings to a block that is not divided further.
-const SMALLEST: usize = 4;
+const SMALLEST: usize = 2;
 
 /// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]

@@ -99,7 +99,9 @@ fn prefix_sums_of_fine_maps_keep_their_tolerance() {
         let partial = |p: usize| grid.centre(p).0 + 0.1 * (p % 7) as f64 > 2.2 || p % 101 == 5;
         for holes in [false, true] {
             let map = masked(&noise(nside, 9, 5), |p| holes && partial(p));
+            let start = std::time::Instant::now();
             let ways = compare(&map, output, radius, 1e-7, Weight::Length);
+            eprintln!("TIME {nside} {output} {radius} {:?} {ways:?}", start.elapsed());
             assert!(
                 ways.missed * 10 < ways.prefix && ways.direct == 0,
                 "Nside {nside} to {output}, {radius}°: {ways:?}"
