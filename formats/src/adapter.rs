@@ -13,6 +13,7 @@ use std::str::FromStr;
 use flate2::read::MultiGzDecoder;
 
 use crate::healpix_fits::HealpixFits;
+use crate::map::Time;
 use crate::{CoordinateSystem, Error, Map, Ordering};
 
 /// The field of a file that is to be read.
@@ -52,8 +53,101 @@ pub struct Selection {
     pub field: Option<Field>,
     /// The HDU, 0 for the primary one; the first HEALPix table unless given.
     pub hdu: Option<usize>,
-    /// The Nside (a power of two) to bring a multi-order map to; that of its finest cells unless given.
+    /// The Nside to bring the field to: of a multi-order map (a power of two; that of its finest cells unless given), or
+    /// of a field on another grid (that closest to its spacing unless given).
     pub nside: Option<usize>,
+    /// Places along the dimensions other than those of the sphere.
+    pub at: Vec<At>,
+    /// How fields on other grids are brought to HEALPix.
+    pub regrid: Regrid,
+}
+
+/// A place along a dimension.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct At {
+    /// Name of the dimension, or of its coordinate.
+    pub dimension: String,
+    /// The place.
+    pub place: Place,
+}
+
+/// How a place along a dimension is named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// By the value of its coordinate, such as `500` or, for times, `1997-12`.
+    Value(String),
+    /// By its number from 0.
+    Index(usize),
+}
+
+/// How fields on other grids, or at points, are brought to HEALPix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Regrid {
+    /// From grids of longitude and latitude.
+    pub method: Method,
+    /// Pixels with a smaller share of valid values than this are masked.
+    pub min_valid: f64,
+    /// From points.
+    pub gather: Gather,
+    /// Pixels farther than this from any point, in degrees, are masked; unless given, twice the typical distance between
+    /// points.
+    pub reach: Option<f64>,
+    /// The point from which a surface is seen; the mean of its vertices unless given.
+    pub centre: Option<[f64; 3]>,
+    /// Whether, where a ray from the centre crosses a surface more than once, the outermost crossing counts.
+    pub allow_folds: bool,
+}
+
+impl Default for Regrid {
+    fn default() -> Self {
+        Regrid {
+            method: Method::default(),
+            min_valid: 0.5,
+            gather: Gather::default(),
+            reach: None,
+            centre: None,
+            allow_folds: false,
+        }
+    }
+}
+
+/// How a field on a grid of longitude and latitude is brought to HEALPix.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// The mean over the pixel, from the areas that grid cells and pixel share.
+    #[default]
+    Conservative,
+    /// Interpolated between the four grid points about the pixel's centre.
+    Bilinear,
+    /// The grid point nearest to the pixel's centre.
+    Nearest,
+}
+
+/// How values at points make a map.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Gather {
+    /// The mean of the points in a pixel; the nearest point where there is none.
+    #[default]
+    Mean,
+    /// The mean of all points, weighted by a Gaussian of this full width at half maximum in degrees.
+    Gaussian {
+        /// The width.
+        fwhm: f64,
+    },
+    /// The nearest point.
+    Nearest,
+}
+
+/// The maps that a selection names: one, or one for each step in time, all on one grid.
+pub trait Maps {
+    /// The times of the steps; one map without a time has none and counts as one step.
+    fn times(&self) -> &[Time];
+
+    /// Reads one map. What the steps share, such as weights, is computed once.
+    ///
+    /// # Errors
+    /// Where the file cannot be read.
+    fn read(&mut self, step: usize) -> Result<Map, Error>;
 }
 
 /// What a file holds.
@@ -124,22 +218,33 @@ pub trait Adapter: Sync {
     /// Where the file cannot be read or holds no map.
     fn describe(&self, path: &Path) -> Result<Description, Error>;
 
-    /// Reads one field.
+    /// Finds what is selected, so that its maps can be read.
     ///
     /// # Errors
     /// Where the file cannot be read, or has not what is selected.
-    fn read(&self, path: &Path, selection: &Selection) -> Result<Map, Error>;
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error>;
 }
 
 /// All adapters; the first that recognises a file reads it.
 static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits];
 
-/// Reads one field of a file of any known format.
+/// Finds what is selected of a file of any known format.
 ///
 /// # Errors
 /// [`Error::File`], which names the file, around the reason.
+pub fn open(path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    adapter(path).and_then(|adapter| adapter.open(path, selection)).map_err(|e| e.of(path))
+}
+
+/// Reads one map of a file of any known format.
+///
+/// # Errors
+/// [`Error::File`], which names the file, around the reason; [`Error::Steps`] where there is one map for each of several
+/// times.
 pub fn read(path: &Path, selection: &Selection) -> Result<Map, Error> {
-    adapter(path).and_then(|adapter| adapter.read(path, selection)).map_err(|e| e.of(path))
+    let mut maps = open(path, selection)?;
+    let steps = maps.times().len();
+    if steps > 1 { Err(Error::Steps { steps }) } else { maps.read(0) }.map_err(|e| e.of(path))
 }
 
 /// What a file of any known format holds.

@@ -332,6 +332,13 @@ pub enum Error {
         gibibytes: f64,
     },
 
+    /// One map for each of several times where one map is needed.
+    #[error("there is a map for each of {steps} times; choose one with --select")]
+    Steps {
+        /// The number of times.
+        steps: usize,
+    },
+
     /// A file that is not to be replaced.
     #[error("the file exists; choose another name, or overwrite it with --overwrite")]
     Exists,

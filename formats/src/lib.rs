@@ -6,6 +6,7 @@
 
 mod adapter;
 mod cfitsio;
+mod dataset;
 mod error;
 mod healpix;
 mod healpix_fits;
@@ -13,10 +14,11 @@ mod map;
 mod save;
 
 pub use adapter::{
-    Adapter, Description, Field, FieldDescription, Indexing, Selection, TableDescription, describe, read,
+    Adapter, At, Description, Field, FieldDescription, Gather, Indexing, Maps, Method, Place, Regrid, Selection,
+    TableDescription, describe, open, read,
 };
 pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
-pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, UNSEEN, is_bad};
+pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
 pub use save::{check_writable, save};

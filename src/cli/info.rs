@@ -65,7 +65,8 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
         let mut fields = Vec::new();
         for (number, field) in table.fields.iter().enumerate() {
             let nside = arguments.nside.filter(|_| table.indexing == Indexing::MultiOrder);
-            let selection = Selection { field: Some(Field::Number(number)), hdu: Some(table.hdu), nside };
+            let selection =
+                Selection { field: Some(Field::Number(number)), hdu: Some(table.hdu), nside, ..Selection::default() };
             let (map, not_a_map) = match formats::read(&arguments.file, &selection) {
                 Ok(map) => (Some(map), None),
                 Err(e) => (None, Some(kind(e)?)),

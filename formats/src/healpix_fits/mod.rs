@@ -18,7 +18,7 @@ use tempfile::NamedTempFile;
 
 use crate::adapter::{gunzipped_head, is_gzip};
 use crate::cfitsio::FitsReader;
-use crate::{Adapter, Description, Error, Map, Selection};
+use crate::{Adapter, Description, Error, Map, Maps, Selection, Time};
 
 pub use write::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
 
@@ -47,11 +47,28 @@ impl Adapter for HealpixFits {
         Ok(Description { format: self.name(), tables })
     }
 
-    fn read(&self, path: &Path, selection: &Selection) -> Result<Map, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
         let mut fits = open(path)?;
         let hdu = scan::choose(&mut fits, selection.hdu)?;
         let table = table::Table::parse(&mut fits, hdu)?;
-        read::read(&mut fits, &table, selection)
+        Ok(Box::new(One { fits, table, selection: selection.clone() }))
+    }
+}
+
+/// The one map of a table.
+struct One {
+    fits: FitsReader,
+    table: table::Table,
+    selection: Selection,
+}
+
+impl Maps for One {
+    fn times(&self) -> &[Time] {
+        &[]
+    }
+
+    fn read(&mut self, _: usize) -> Result<Map, Error> {
+        read::read(&mut self.fits, &self.table, &self.selection)
     }
 }
 
