@@ -81,7 +81,7 @@ fn what_is_written_is_read() {
         for (hdu, extension) in (1..).zip(&file.extensions) {
             for (number, column) in extension.columns.iter().enumerate() {
                 let field = Some(Field::Number(number));
-                let map = read(&path, &Selection { field, hdu: Some(hdu), nside: None }).unwrap();
+                let map = read(&path, &Selection { field, hdu: Some(hdu), ..Selection::default() }).unwrap();
                 assert_same(map.values(), &column.values);
                 assert_eq!((&map.name, map.ordering, map.grid()), (&column.name, file.ordering, file.grid));
                 assert_eq!(map.unit.unwrap_or_default(), column.unit);
