@@ -339,6 +339,33 @@ pub enum Error {
         steps: usize,
     },
 
+    /// Metadata of a Zarr store that cannot be.
+    #[error("the metadata of {node} in this Zarr store is wrong ({problem}); fetch or write the store again")]
+    ZarrMetadata {
+        /// The array, group or file.
+        node: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The Zarr library refused.
+    #[error("cannot read the array '{array}': the Zarr library says \"{message}\"; check the store with zarr-python")]
+    Zarr {
+        /// Path of the array.
+        array: String,
+        /// The library's words.
+        message: String,
+    },
+    /// An array, or a chunk of it, larger than memory.
+    #[error(
+        "the part of array '{array}' that is needed, or a chunk of it, has {gibibytes:.1} GiB, more memory than there is; select less of it, or rechunk the store"
+    )]
+    ZarrMemory {
+        /// Path of the array.
+        array: String,
+        /// The memory needed.
+        gibibytes: f64,
+    },
+
     /// A file that is not to be replaced.
     #[error("the file exists; choose another name, or overwrite it with --overwrite")]
     Exists,

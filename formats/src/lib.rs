@@ -12,6 +12,8 @@ mod healpix;
 mod healpix_fits;
 mod map;
 mod save;
+mod zarr;
+mod zarr_zstd;
 
 pub use adapter::{
     Adapter, At, Description, Field, FieldDescription, Gather, Indexing, Maps, Method, Place, Regrid, Selection,
