@@ -21,6 +21,6 @@ pub use adapter::{
 };
 pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
-pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
+pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
 pub use save::{check_writable, save};

@@ -20,7 +20,7 @@ use crate::adapter::{gunzipped_head, is_gzip};
 use crate::cfitsio::FitsReader;
 use crate::{Adapter, Description, Error, Map, Maps, Selection, Time};
 
-pub use write::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
+pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 
 /// FITS files consist of blocks of this many bytes.
 const BLOCK: u64 = 2880;

@@ -195,6 +195,41 @@ fn the_same_map_gives_the_same_bytes() {
 }
 
 #[test]
+fn tables_one_by_one_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, file) in files() {
+        let (whole, parts) = (folder.path().join(&name), folder.path().join(format!("parts-{name}")));
+        write_healpix(&whole, &file, false).unwrap();
+        let HealpixFile { grid, ordering, coordinates, float32, extensions } = file;
+        save(&parts, false, |path| {
+            let mut writer = HealpixWriter::create(path, HealpixLayout { grid, ordering, coordinates, float32 })?;
+            for extension in &extensions {
+                writer.append(extension)?;
+            }
+            writer.finish()
+        })
+        .unwrap();
+        assert!(fs::read(whole).unwrap() == fs::read(parts).unwrap(), "{name}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2 * files().len());
+
+    // A table that cannot be written leaves no file behind.
+    let path = folder.path().join("bad.fits");
+    let file = file(3, Ordering::Ring, false);
+    let layout = HealpixLayout { grid: file.grid, ordering: file.ordering, coordinates: None, float32: false };
+    let (error, _) = problem(save(&path, false, |path| {
+        let mut writer = HealpixWriter::create(path, layout)?;
+        writer.append(&file.extensions[0])?;
+        let mut short = file.extensions[1].clone();
+        short.columns[1].values.pop();
+        writer.append(&short)?;
+        writer.finish()
+    }));
+    assert!(matches!(error, Error::ColumnLength { found: 107, nside: 3, expected: 108, .. }));
+    assert!(!path.exists());
+}
+
+#[test]
 fn what_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.fits");
