@@ -5,12 +5,14 @@
 //! puts a finished file in its place. What is done with a map is left to others.
 
 mod adapter;
+mod canvas;
 mod cfitsio;
 mod dataset;
 mod error;
 mod healpix;
 mod healpix_fits;
 mod map;
+mod multi_order;
 mod save;
 mod zarr;
 mod zarr_zstd;

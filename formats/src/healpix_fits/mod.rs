@@ -1,6 +1,6 @@
 //! HEALPix maps in FITS files.
 //!
-//! [`table`] understands headers, [`read`] fetches values, [`multi_order`] brings cells of several sizes to one grid,
+//! [`table`] understands headers, [`read`] fetches values, [`multi_order`] those of cells of several sizes,
 //! [`mod@write`] makes files. The bytes themselves are left to [`crate::cfitsio`].
 
 mod multi_order;

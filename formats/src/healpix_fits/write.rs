@@ -10,7 +10,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
-use super::read::CHUNK;
+use crate::canvas::CHUNK;
 use crate::cfitsio::FitsWriter;
 use crate::{CoordinateSystem, Error, Healpix, Ordering, UNSEEN, save};
 
