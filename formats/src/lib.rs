@@ -10,7 +10,9 @@ mod dataset;
 mod error;
 mod healpix;
 mod healpix_fits;
+mod libnetcdf;
 mod map;
+mod netcdf;
 mod save;
 
 pub use adapter::{
