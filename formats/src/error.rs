@@ -332,6 +332,45 @@ pub enum Error {
         gibibytes: f64,
     },
 
+    /// The NetCDF library refused.
+    #[error("cannot {action}: the NetCDF library says \"{message}\"; check the file with ncdump -h")]
+    Netcdf {
+        /// What was attempted.
+        action: String,
+        /// libnetcdf's words for what is wrong.
+        message: String,
+    },
+    /// A NetCDF file with less data than its header promises.
+    #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
+    NetcdfTruncated {
+        /// The size that the header implies, in bytes.
+        needed: u128,
+        /// The file's size in bytes.
+        found: u64,
+    },
+    /// A variable too large for the memory.
+    #[error("'{variable}' needs {gibibytes:.1} GiB, more memory than there is; choose a part of it with --select")]
+    VariableMemory {
+        /// The variable, or the attribute.
+        variable: String,
+        /// The memory needed.
+        gibibytes: f64,
+    },
+    /// A variable of compound or other kinds.
+    #[error("variable '{variable}' holds neither numbers nor text; choose another one with --variable")]
+    VariableKind {
+        /// The variable.
+        variable: String,
+    },
+    /// A number beyond those of 64 bits with a sign.
+    #[error("variable '{variable}' holds {value}, beyond 2^63 - 1; store it as a signed or a real number")]
+    LargeNumber {
+        /// The variable.
+        variable: String,
+        /// The number.
+        value: u64,
+    },
+
     /// One map for each of several times where one map is needed.
     #[error("there is a map for each of {steps} times; choose one with --select")]
     Steps {
