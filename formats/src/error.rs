@@ -340,6 +340,30 @@ pub enum Error {
         /// libnetcdf's words for what is wrong.
         message: String,
     },
+    /// The NetCDF library could not write.
+    #[error("cannot {action}: the NetCDF library says \"{message}\"; check the space and the permissions there")]
+    NetcdfWrite {
+        /// What was attempted.
+        action: String,
+        /// libnetcdf's words for what is wrong.
+        message: String,
+    },
+    /// A grid that CF has no refinement level for.
+    #[error(
+        "Nside {nside} is not a power of two, which HEALPix in NetCDF needs (its refinement level is log2 Nside); write FITS"
+    )]
+    RefinementLevel {
+        /// The Nside.
+        nside: usize,
+    },
+    /// Steps that a NetCDF file has no room for.
+    #[error(
+        "step {step} does not go with the file's columns and axis of time; give each step all columns and its time, or a file without such an axis one step"
+    )]
+    StepTime {
+        /// The step, from 1.
+        step: usize,
+    },
     /// A NetCDF file with less data than its header promises.
     #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
     NetcdfTruncated {
