@@ -5,6 +5,7 @@
 //! puts a finished file in its place. What is done with a map is left to others.
 
 mod adapter;
+mod cf;
 mod cfitsio;
 mod dataset;
 mod error;
