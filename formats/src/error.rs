@@ -380,11 +380,27 @@ pub enum Error {
         /// The memory needed.
         gibibytes: f64,
     },
-    /// A variable of compound or other kinds.
-    #[error("variable '{variable}' holds neither numbers nor text; choose another one with --variable")]
+    /// A variable that holds no numbers.
+    #[error("variable '{variable}' holds {found}, which is not a field of numbers; choose another variable")]
     VariableKind {
         /// The variable.
         variable: String,
+        /// What it holds.
+        found: &'static str,
+    },
+    /// An attribute with an impossible value.
+    #[error(
+        "variable '{variable}' has {attribute} = {found}, which is not {expected}; correct it, such as with ncatted"
+    )]
+    AttributeValue {
+        /// The variable.
+        variable: String,
+        /// The attribute.
+        attribute: &'static str,
+        /// Its value.
+        found: String,
+        /// What would do.
+        expected: &'static str,
     },
     /// A number beyond those of 64 bits with a sign.
     #[error("variable '{variable}' holds {value}, beyond 2^63 - 1; store it as a signed or a real number")]

@@ -6,6 +6,7 @@
 
 mod adapter;
 mod canvas;
+mod cf;
 mod cfitsio;
 mod dataset;
 mod error;

@@ -69,7 +69,7 @@ impl Dataset for NetcdfFile {
 
     fn read(&self, variable: &Variable, ranges: &[Range<usize>]) -> Result<Array, Error> {
         let number = self.variables.iter().position(|v| v.name == variable.name && v.group == variable.group);
-        let kind = || Error::VariableKind { variable: variable.path() };
+        let kind = || Error::VariableKind { variable: variable.path(), found: "neither numbers nor text" };
         let head = &self.heads[number.ok_or_else(kind)?];
         let mut part = Part {
             start: ranges.iter().map(|range| range.start).collect(),

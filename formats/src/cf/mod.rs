@@ -1,0 +1,10 @@
+//! The CF conventions for climate and forecast data, on top of any [`Dataset`](crate::dataset::Dataset).
+//!
+//! [`mod@unpack`] turns stored numbers into a field's values, [`coordinates`] finds what belongs to a variable's
+//! dimensions, [`time`] reads dates, [`select`] finds places along dimensions. What a grid is, and how it becomes a
+//! map, is left to the adapters.
+
+mod time;
+mod unpack;
+
+pub(crate) use unpack::values;
