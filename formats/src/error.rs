@@ -378,6 +378,154 @@ pub enum Error {
         /// What would do.
         expected: &'static str,
     },
+    /// No variable that could be a map.
+    #[error("no variable has dimensions of latitude and longitude in degrees; the variables are {variables}")]
+    NoLatLon {
+        /// The variables and their dimensions.
+        variables: String,
+    },
+    /// Several variables that could be meant.
+    #[error("there are several variables, so name one with --variable: {variables}")]
+    SeveralVariables {
+        /// The variables, their dimensions and units.
+        variables: String,
+    },
+    /// A variable that is not there, or is no map.
+    #[error("there is no variable {variable} with latitude and longitude; those that have them are {variables}")]
+    UnknownVariable {
+        /// The name or number asked for.
+        variable: String,
+        /// The variables that have them.
+        variables: String,
+    },
+    /// A dimension without places.
+    #[error("dimension '{dimension}' of variable '{variable}' has length 0, so there is nothing to read; check how the file was made")]
+    EmptyDimension {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+    },
+    /// Coordinates over two dimensions.
+    #[error(
+        "variable '{variable}' is on a curvilinear grid, whose coordinate '{coordinate}' has two dimensions, but only rectilinear ones are read; regrid it first, such as with cdo remapbil,global_1"
+    )]
+    Curvilinear {
+        /// The variable.
+        variable: String,
+        /// The coordinate.
+        coordinate: String,
+    },
+    /// A latitude and a longitude for each place of one dimension.
+    #[error(
+        "variable '{variable}' is on an unstructured grid, whose latitudes and longitudes both run along '{dimension}', but only rectilinear ones are read; regrid it first, such as with cdo remapnn,global_1"
+    )]
+    Unstructured {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+    },
+    /// Coordinates of a rotated or projected grid.
+    #[error(
+        "coordinate '{coordinate}' is a {found}, not a latitude or longitude; regrid the field first, such as with cdo remapbil,global_1"
+    )]
+    OtherAxis {
+        /// The coordinate.
+        coordinate: String,
+        /// Its standard name.
+        found: String,
+    },
+    /// Coordinates in radians.
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', but degrees are needed; multiply it by 180/pi and set its units to degrees, such as with ncap2"
+    )]
+    CoordinateRadians {
+        /// The coordinate.
+        coordinate: String,
+        /// Its unit.
+        units: String,
+    },
+    /// Coordinates in metres or other units.
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', not degrees; bring the field to a grid of latitude and longitude first, such as with gdalwarp -t_srs EPSG:4326"
+    )]
+    CoordinateUnits {
+        /// The coordinate.
+        coordinate: String,
+        /// Its unit.
+        units: String,
+    },
+    /// A dimension to choose along that is not there.
+    #[error("variable '{variable}' has no dimension '{dimension}' to choose along; its dimensions are {dimensions}")]
+    NoSuchDimension {
+        /// The variable.
+        variable: String,
+        /// The name asked for.
+        dimension: String,
+        /// The dimensions and their lengths.
+        dimensions: String,
+    },
+    /// A place chosen along latitude or longitude.
+    #[error("dimension '{dimension}' runs over the sphere, all of which is read; leave it out of --select")]
+    SphereDimension {
+        /// The dimension.
+        dimension: String,
+    },
+    /// Two choices along one dimension.
+    #[error("dimension '{dimension}' is chosen along twice; leave one --select out")]
+    SelectedTwice {
+        /// The dimension.
+        dimension: String,
+    },
+    /// A value that a coordinate does not have.
+    #[error("there is no {dimension} = {place}; the values are {values}")]
+    NoSuchPlace {
+        /// The dimension.
+        dimension: String,
+        /// The value asked for.
+        place: String,
+        /// The values.
+        values: String,
+    },
+    /// A value that a coordinate has more than once.
+    #[error("{dimension} = {place} is met {count} times; choose one by its number, such as --select {dimension}=#{first}")]
+    SeveralPlaces {
+        /// The dimension.
+        dimension: String,
+        /// The value asked for.
+        place: String,
+        /// How often.
+        count: usize,
+        /// The number of the first.
+        first: usize,
+    },
+    /// A place beyond a dimension.
+    #[error("there is no {dimension} = #{index}; they are numbered from #0 to #{last}")]
+    IndexRange {
+        /// The dimension.
+        dimension: String,
+        /// The number asked for.
+        index: usize,
+        /// The last number.
+        last: usize,
+    },
+    /// A dimension along which nothing is chosen.
+    #[error("variable '{variable}' has several values along '{dimension}': {values}; choose one with --select {dimension}=VALUE")]
+    DimensionLeft {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+        /// The values.
+        values: String,
+    },
+    /// An HDU asked of a file that has none.
+    #[error("there is no HDU {hdu} in a file of this format; leave --hdu out")]
+    NoHdus {
+        /// The HDU asked for.
+        hdu: usize,
+    },
     /// A number beyond those of 64 bits with a sign.
     #[error("variable '{variable}' holds {value}, beyond 2^63 - 1; store it as a signed or a real number")]
     LargeNumber {
