@@ -11,6 +11,7 @@ mod error;
 mod healpix;
 mod healpix_fits;
 mod map;
+mod regrid;
 mod save;
 
 pub use adapter::{
@@ -21,4 +22,5 @@ pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use regrid::{LatLon, Weights};
 pub use save::{check_writable, save};
