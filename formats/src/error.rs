@@ -399,7 +399,9 @@ pub enum Error {
         variables: String,
     },
     /// A dimension without places.
-    #[error("dimension '{dimension}' of variable '{variable}' has length 0, so there is nothing to read; check how the file was made")]
+    #[error(
+        "dimension '{dimension}' of variable '{variable}' has length 0, so there is nothing to read; check how the file was made"
+    )]
     EmptyDimension {
         /// The variable.
         variable: String,
@@ -489,7 +491,9 @@ pub enum Error {
         values: String,
     },
     /// A value that a coordinate has more than once.
-    #[error("{dimension} = {place} is met {count} times; choose one by its number, such as --select {dimension}=#{first}")]
+    #[error(
+        "{dimension} = {place} is met {count} times; choose one by its number, such as --select {dimension}=#{first}"
+    )]
     SeveralPlaces {
         /// The dimension.
         dimension: String,
@@ -511,7 +515,9 @@ pub enum Error {
         last: usize,
     },
     /// A dimension along which nothing is chosen.
-    #[error("variable '{variable}' has several values along '{dimension}': {values}; choose one with --select {dimension}=VALUE")]
+    #[error(
+        "variable '{variable}' has several values along '{dimension}': {values}; choose one with --select {dimension}=VALUE"
+    )]
     DimensionLeft {
         /// The variable.
         variable: String,
@@ -540,6 +546,108 @@ pub enum Error {
     Steps {
         /// The number of times.
         steps: usize,
+    },
+
+    /// A coordinate without values.
+    #[error("the {coordinate} has no values; check the file")]
+    NoCoordinates {
+        /// Which coordinate: latitude or longitude.
+        coordinate: &'static str,
+    },
+    /// A coordinate that turns back, or stands still.
+    #[error(
+        "the {coordinate} {value} at index {index} follows {before} against the order of the other values; sort the field along it"
+    )]
+    NotMonotonic {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value before.
+        before: f64,
+        /// The value.
+        value: f64,
+    },
+    /// A coordinate, or a bound of a cell, that is not on the sphere.
+    #[error("the {coordinate} {value} at index {index} is not between {least} and {most} degrees; {remedy}")]
+    CoordinateRange {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// The least it could be.
+        least: f64,
+        /// The most it could be.
+        most: f64,
+        /// What it looks like, and what to do.
+        remedy: &'static str,
+    },
+    /// Coordinates in radians.
+    #[error("the longitudes go once around in 2π, so they look like radians; convert the coordinates to degrees")]
+    Radians,
+    /// Longitudes that go around the sphere more than once.
+    #[error("the longitudes span {span} degrees, more than the circle has; remove the columns that repeat others")]
+    LongitudeSpan {
+        /// From the first to the last.
+        span: f64,
+    },
+    /// A single value, from which no size of a cell follows.
+    #[error(
+        "the {coordinate} has the single value {value} and no bounds, so the extent of its cells is unknown; add bounds"
+    )]
+    NoSpacing {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// Bounds of cells that do not match the coordinate.
+    #[error(
+        "the {coordinate} has {points} values but {bounds} bounds, which are neither edges ({points} + 1) nor pairs (2 x {points}); correct the bounds"
+    )]
+    BoundsCount {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of values.
+        points: usize,
+        /// The number of bounds.
+        bounds: usize,
+    },
+    /// A cell that its own point is not in.
+    #[error("the {coordinate} {value} at index {index} is not within its bounds {low} and {high}; correct the bounds")]
+    BoundsApart {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// One bound.
+        low: f64,
+        /// The other.
+        high: f64,
+    },
+    /// Cells that share an area.
+    #[error("the bounds of the {coordinate} at the indices {first} and {second} overlap; correct the bounds")]
+    BoundsOverlap {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of one value, from 0.
+        first: usize,
+        /// The number of the other.
+        second: usize,
+    },
+    /// A grid beyond what weights can name.
+    #[error(
+        "a grid of {latitudes} latitudes and {longitudes} longitudes has more than 2^32 cells; select a part of it"
+    )]
+    GridSize {
+        /// The number of latitudes.
+        latitudes: usize,
+        /// The number of longitudes.
+        longitudes: usize,
     },
 
     /// A file that is not to be replaced.

@@ -14,6 +14,7 @@ mod healpix_fits;
 mod libnetcdf;
 mod map;
 mod netcdf;
+mod regrid;
 mod save;
 
 pub use adapter::{
@@ -24,4 +25,5 @@ pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use regrid::{LatLon, Weights};
 pub use save::{check_writable, save};

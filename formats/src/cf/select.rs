@@ -8,10 +8,10 @@ use std::ops::Range;
 use super::coordinates::{Axis, coordinate_of, scalar_time};
 use super::time::TimeUnits;
 use super::unpack::values;
+use crate::Error;
 use crate::adapter::{At, Place};
 use crate::dataset::{Array, Dataset, Dimension, Kind, Variable};
 use crate::map::Time;
-use crate::Error;
 
 /// A number names a coordinate value within this part of it, so that 0.1 finds 0.1 in single precision.
 const VALUE_TOLERANCE: f64 = 1e-6;
@@ -102,9 +102,8 @@ impl Labels {
     fn matching(&self, text: &str) -> Vec<usize> {
         let text = text.trim();
         let wanted: Option<f64> = text.parse().ok();
-        let equal = |value: f64| {
-            wanted.is_some_and(|w| (w - value).abs() <= VALUE_TOLERANCE * w.abs().max(value.abs()))
-        };
+        let equal =
+            |value: f64| wanted.is_some_and(|w| (w - value).abs() <= VALUE_TOLERANCE * w.abs().max(value.abs()));
         let all = |is: &dyn Fn(usize) -> bool| (0..self.len()).filter(|&n| is(n)).collect::<Vec<_>>();
         match self {
             Labels::None(_) => Vec::new(),
@@ -183,12 +182,7 @@ impl Chosen {
 ///
 /// # Errors
 /// Where there is no such place, or a dimension is left over.
-pub(crate) fn select(
-    dataset: &dyn Dataset,
-    variable: &Variable,
-    sphere: &[usize],
-    at: &[At],
-) -> Result<Chosen, Error> {
+pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize], at: &[At]) -> Result<Chosen, Error> {
     let dimensions = &variable.dimensions;
     if let Some(empty) = dimensions.iter().find(|dimension| dimension.len == 0) {
         return Err(Error::EmptyDimension { variable: variable.path(), dimension: empty.name.clone() });
