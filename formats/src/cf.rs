@@ -4,7 +4,11 @@
 //! dimensions, [`time`] reads dates, [`select`] finds places along dimensions. What a grid is, and how it becomes a
 //! map, is left to the adapters.
 
+mod coordinates;
+mod select;
 mod time;
 mod unpack;
 
+pub(crate) use coordinates::{Axis, Horizontal, coordinate_of, find, names_in};
+pub(crate) use select::{Chosen, Labels, select, shape};
 pub(crate) use unpack::values;
