@@ -11,6 +11,8 @@ mod dataset;
 mod error;
 mod healpix;
 mod healpix_fits;
+mod interpret;
+mod latlon;
 mod libnetcdf;
 mod map;
 mod netcdf;
@@ -18,8 +20,8 @@ mod regrid;
 mod save;
 
 pub use adapter::{
-    Adapter, At, Description, Field, FieldDescription, Gather, Indexing, Maps, Method, Place, Regrid, Selection,
-    TableDescription, describe, open, read,
+    Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
+    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, open, read,
 };
 pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
