@@ -13,6 +13,8 @@ mod error;
 mod healpix;
 mod healpix_cf;
 mod healpix_fits;
+mod interpret;
+mod latlon;
 mod libnetcdf;
 mod map;
 mod multi_order;
@@ -24,8 +26,8 @@ mod zarr;
 mod zarr_zstd;
 
 pub use adapter::{
-    Adapter, At, Description, Field, FieldDescription, Gather, Indexing, Maps, Method, Place, Regrid, Selection,
-    TableDescription, describe, open, read,
+    Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
+    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, open, read,
 };
 pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};

@@ -123,6 +123,11 @@ impl Map {
         &self.values
     }
 
+    /// The values alone.
+    pub(crate) fn into_values(self) -> Vec<f64> {
+        self.values
+    }
+
     /// Masks every pixel at which `mask` is below `threshold` or is itself masked.
     ///
     /// # Errors

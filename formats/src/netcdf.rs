@@ -1,18 +1,19 @@
 //! NetCDF files as a [`Dataset`]: NetCDF 3 in its three variants, NetCDF 4, and HDF5 files that are like it.
 //!
-//! The calls are left to [`crate::libnetcdf`], what names and attributes mean to [`crate::cf`]. [`classic`] sees to
-//! it that a file which is cut short is noticed.
+//! The calls are left to [`crate::libnetcdf`], what names and attributes mean to [`crate::cf`], what a map is to
+//! [`crate::interpret`]. [`classic`] sees to it that a file which is cut short is noticed.
 
 mod classic;
 
 use std::ops::Range;
 use std::path::Path;
+use std::rc::Rc;
 
 use netcdf_sys as sys;
 
-use crate::Error;
 use crate::dataset::{Array, Attribute, Dataset, Kind, Variable};
 use crate::libnetcdf::{NetcdfReader, Part, VariableHead};
+use crate::{Adapter, Description, Error, Maps, Selection, interpret};
 
 /// A NetCDF file.
 pub(crate) struct NetcdfFile {
@@ -24,8 +25,30 @@ pub(crate) struct NetcdfFile {
     heads: Vec<VariableHead>,
 }
 
+/// The adapter for NetCDF files, whatever their grid.
+pub(crate) struct Netcdf;
+
+impl Adapter for Netcdf {
+    fn name(&self) -> &'static str {
+        "NetCDF"
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        recognises(head)
+    }
+
+    fn describe(&self, path: &Path) -> Result<Description, Error> {
+        let tables = interpret::describe(&NetcdfFile::open(path)?)?;
+        Ok(Description { format: self.name(), tables })
+    }
+
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+        interpret::open(Rc::new(NetcdfFile::open(path)?), selection)
+    }
+}
+
 /// Whether a file that begins with `head` is NetCDF, or HDF5, which NetCDF 4 is.
-pub(crate) fn recognises(head: &[u8]) -> bool {
+fn recognises(head: &[u8]) -> bool {
     // A block of the user's may precede HDF5: 512 bytes, or twice that, and so on.
     let starts = std::iter::successors(Some(512), |start| Some(start * 2)).take_while(|&start| start < head.len());
     let hdf5 = |start: usize| head[start.min(head.len())..].starts_with(b"\x89HDF\r\n\x1a\n");

@@ -143,6 +143,12 @@ impl LatLon {
         (self.latitudes.spacing() * self.longitudes.spacing()).sqrt()
     }
 
+    /// Whether the cells cover the sphere, from pole to pole and once around.
+    pub fn is_global(&self) -> bool {
+        let ends = (self.latitudes.cells.first(), self.latitudes.cells.last());
+        self.periodic && matches!(ends, (Some(south), Some(north)) if south.low <= -90.0 && north.high >= 90.0)
+    }
+
     /// The Nside, a power of two, with pixels closest in size to the grid's spacing.
     pub fn nside_closest(&self) -> usize {
         let nside = (PI / 3.0).sqrt() / self.spacing_degrees().to_radians();
