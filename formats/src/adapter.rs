@@ -15,6 +15,7 @@ use flate2::read::MultiGzDecoder;
 use crate::healpix_fits::HealpixFits;
 use crate::map::Time;
 use crate::netcdf::Netcdf;
+use crate::zarr::{self, ZarrStore};
 use crate::{CoordinateSystem, Error, Map, Ordering};
 
 /// The field of a file that is to be read.
@@ -304,7 +305,7 @@ pub trait Adapter: Sync {
     fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error>;
 }
 
-/// All adapters; the first that recognises a file reads it.
+/// All adapters of files; the first that recognises a file reads it.
 static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &Netcdf];
 
 /// Finds what is selected of a file of any known format.
@@ -334,11 +335,11 @@ pub fn describe(path: &Path) -> Result<Description, Error> {
     adapter(path).and_then(|adapter| adapter.describe(path)).map_err(|e| e.of(path))
 }
 
-/// The adapter for a file.
+/// The adapter for a file, or for a folder that is a store.
 fn adapter(path: &Path) -> Result<&'static dyn Adapter, Error> {
     let metadata = std::fs::metadata(path).map_err(Error::io("open it"))?;
     if metadata.is_dir() {
-        return Err(Error::Folder);
+        return if zarr::is_zarr(path) { Ok(&ZarrStore) } else { Err(Error::Folder) };
     }
     if !metadata.is_file() {
         return Err(Error::NotRegular);

@@ -1,12 +1,14 @@
 //! Zarr stores, version 2 and 3, in folders.
 //!
 //! Which arrays and groups there are is found here, from consolidated metadata where a store has them, else from its
-//! folders. Chunks and codecs are left to `zarrs`; what names and attributes mean to [`crate::cf`].
+//! folders. Chunks and codecs are left to `zarrs`; what names and attributes mean to [`crate::cf`], what a map is to
+//! [`crate::interpret`].
 
 use std::fs;
 use std::io;
 use std::ops::Range;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use base64::Engine;
@@ -16,7 +18,7 @@ use zarrs::array::{ArrayMetadata, ArraySubset, ElementOwned};
 use zarrs::filesystem::FilesystemStore;
 
 use crate::dataset::{Array, Attribute, Dataset, Dimension, Kind, Variable};
-use crate::{Error, zarr_zstd};
+use crate::{Adapter, Description, Error, Maps, Selection, interpret, zarr_zstd};
 
 /// Metadata of a node of version 3; of all nodes, where they are consolidated.
 const V3_NODE: &str = "zarr.json";
@@ -35,6 +37,29 @@ const DEPTH_MAX: usize = 16;
 /// Whether a folder is a Zarr store.
 pub(crate) fn is_zarr(folder: &Path) -> bool {
     [V3_NODE, V2_GROUP, V2_ARRAY, V2_ALL].iter().any(|name| folder.join(name).is_file())
+}
+
+/// The adapter for Zarr stores, whatever their grid.
+pub(crate) struct ZarrStore;
+
+impl Adapter for ZarrStore {
+    fn name(&self) -> &'static str {
+        "Zarr"
+    }
+
+    /// No file is one; see [`is_zarr`].
+    fn recognises(&self, _: &[u8]) -> bool {
+        false
+    }
+
+    fn describe(&self, path: &Path) -> Result<Description, Error> {
+        let tables = interpret::describe(&Zarr::open(path)?)?;
+        Ok(Description { format: self.name(), tables })
+    }
+
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+        interpret::open(Rc::new(Zarr::open(path)?), selection)
+    }
 }
 
 /// A Zarr store in a folder.

@@ -158,6 +158,12 @@ impl Grid {
         Grid::along(dataset, variable, says, None, !named.is_empty())
     }
 
+    /// The grid of a variable that is known to be HEALPix.
+    pub(super) fn of(dataset: &dyn Dataset, variable: &Variable) -> Result<Self, Error> {
+        let unknown = "how pixels are numbered (indexing_scheme)";
+        Grid::find(dataset, variable).ok_or_else(|| Error::GridUnknown { variable: variable.path(), unknown })
+    }
+
     /// The grid of a variable, along the dimension of this name if one is given. Where it is not `sure` that the
     /// variable is on the grid, a dimension is needed that looks like one of cells.
     fn along(

@@ -11,9 +11,9 @@ mod read;
 
 use std::rc::Rc;
 
-use crate::cf::shape;
-use crate::dataset::{Dataset, Kind, Variable};
-use crate::{Error, Field, Maps, Selection};
+use crate::cf::{Labels, shape};
+use crate::dataset::{Dataset, Dimension, Kind, Variable};
+use crate::{DimensionDescription, Error, Field, FieldDescription, Maps, Selection, TableDescription, TablePlace};
 use grid::Grid;
 
 /// Finds the field that is selected; nothing where the dataset has no HEALPix field, or another field is named.
@@ -32,8 +32,40 @@ pub(crate) fn open(dataset: &Rc<dyn Dataset>, selection: &Selection) -> Result<O
     read::open(dataset, place, selection).map(Some)
 }
 
+/// What a dataset holds on HEALPix grids; nothing where there is no such field.
+///
+/// # Errors
+/// Where it cannot be read.
+pub(crate) fn describe(dataset: &dyn Dataset) -> Result<Vec<TableDescription>, Error> {
+    fields(dataset).into_iter().map(|place| describe_one(dataset, &dataset.variables()[place])).collect()
+}
+
+fn describe_one(dataset: &dyn Dataset, variable: &Variable) -> Result<TableDescription, Error> {
+    let grid = Grid::of(dataset, variable)?;
+    let others = variable.dimensions.iter().enumerate().filter(|(place, _)| *place != grid.dimension);
+    let describe = |(_, dimension): (usize, &Dimension)| {
+        let labels = Labels::of(dataset, variable, dimension)?;
+        Ok(DimensionDescription {
+            name: dimension.name.clone(),
+            len: dimension.len,
+            time: matches!(labels, Labels::Times(..)),
+            values: labels.listed(),
+        })
+    };
+    Ok(TableDescription {
+        place: TablePlace::Variable { variable: variable.path() },
+        grid: read::describe(dataset, variable, &grid)?,
+        dimensions: others.map(describe).collect::<Result<_, Error>>()?,
+        fields: vec![FieldDescription {
+            name: variable.name.clone(),
+            unit: variable.text("units").map(str::to_owned),
+            long_name: variable.text("long_name").map(str::to_owned),
+        }],
+    })
+}
+
 /// The fields on a HEALPix grid, as places among the dataset's variables.
-pub(crate) fn fields(dataset: &dyn Dataset) -> Vec<usize> {
+fn fields(dataset: &dyn Dataset) -> Vec<usize> {
     let variables = dataset.variables().iter().enumerate();
     variables.filter(|(_, v)| is_field(v) && Grid::find(dataset, v).is_some()).map(|(place, _)| place).collect()
 }

@@ -10,22 +10,35 @@ use super::grid::{Grid, Scheme};
 use crate::canvas::{CHUNK, Canvas};
 use crate::dataset::{Array, Dataset, Variable};
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
-use crate::{Error, Healpix, Map, Maps, Ordering, Selection, Time, UNSEEN, cf, is_bad};
+use crate::{Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Selection, Time, UNSEEN, cf, is_bad};
 
 /// Finds what is selected of a field.
 pub(super) fn open(dataset: &Rc<dyn Dataset>, variable: usize, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
     let field = &dataset.variables()[variable];
-    let unknown = || Error::GridUnknown { variable: field.path(), unknown: "how pixels are numbered" };
-    let grid = Grid::find(&**dataset, field).ok_or_else(unknown)?;
+    let grid = Grid::of(&**dataset, field)?;
     let chosen = cf::select(&**dataset, field, &[grid.dimension], &selection.at)?;
     let scheme = grid.scheme(field)?;
-    if let (Scheme::Pixels(healpix, _), Some(asked)) = (scheme, selection.nside) {
-        if asked != healpix.nside() {
-            return Err(Error::OneResolution { variable: field.path(), nside: healpix.nside(), asked });
-        }
+    if let (Scheme::Pixels(healpix, _), Some(asked)) = (scheme, selection.nside)
+        && asked != healpix.nside()
+    {
+        return Err(Error::OneResolution { variable: field.path(), nside: healpix.nside(), asked });
     }
     let cells = cells(&**dataset, field, &grid, scheme)?;
     Ok(Box::new(Field { dataset: dataset.clone(), variable, chosen, cells, nside: selection.nside }))
+}
+
+/// The grid of a field, in words for users.
+pub(super) fn describe(dataset: &dyn Dataset, field: &Variable, grid: &Grid) -> Result<GridDescription, Error> {
+    let (nside, ordering, indexing) = match cells(dataset, field, grid, grid.scheme(field)?)? {
+        Cells::All(healpix, ordering) => (healpix.nside(), ordering, Indexing::Implicit),
+        Cells::Some(healpix, ordering, _) => (healpix.nside(), ordering, Indexing::Explicit),
+        Cells::Sizes(places, _) => {
+            let finest = places.iter().map(|&place| Cell { place, value: 0.0 }.order()).max();
+            (1 << finest.unwrap_or(0), Ordering::Nested, Indexing::MultiOrder)
+        }
+    };
+    let pixels = field.dimensions[grid.dimension].len;
+    Ok(GridDescription::Healpix { nside, ordering, ordering_assumed: false, coordinates: None, indexing, pixels })
 }
 
 /// What each cell of a field is.
@@ -168,7 +181,8 @@ fn pixels(
 /// The numbers of cells.
 fn numbers(dataset: &dyn Dataset, index: &Variable) -> Result<Vec<i64>, Error> {
     let wrong = |found| Error::CellKind { index: index.path(), found };
-    match dataset.read(index, &[0..index.dimensions[0].len])? {
+    let whole: Vec<_> = index.dimensions.iter().map(|dimension| 0..dimension.len).collect();
+    match dataset.read(index, &whole)? {
         Array::Whole(numbers) => Ok(numbers),
         Array::Real(numbers) => {
             // Some software stores them so.
