@@ -309,7 +309,7 @@ fn array(node: Node, store: &str) -> Result<(Variable, Stored), Error> {
         let name = names.and_then(|names| names[i].as_str()).map_or_else(|| format!("dim_{i}"), str::to_owned);
         Dimension { name, len }
     };
-    let dimensions = shape.iter().enumerate().map(dimension).collect();
+    let dimensions: Vec<_> = shape.iter().enumerate().map(dimension).collect();
 
     let (element, kind) = element(&metadata);
     let mut attributes = attributes(given);
@@ -325,6 +325,10 @@ fn array(node: Node, store: &str) -> Result<(Variable, Stored), Error> {
     }
     if let Some(metadata) = metadata.as_object_mut() {
         metadata.remove("attributes");
+        // With fewer than two dimensions both orders are the same, and `zarrs` takes "F" badly where there is none.
+        if dimensions.len() < 2 && metadata.contains_key("order") {
+            metadata.insert("order".to_owned(), "C".into());
+        }
     }
     let group = if group.is_empty() { "/" } else { group };
     let variable = Variable { name: name.to_owned(), group: group.to_owned(), kind, dimensions, attributes };

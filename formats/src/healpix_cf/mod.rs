@@ -70,7 +70,7 @@ fn fields(dataset: &dyn Dataset) -> Vec<usize> {
     variables.filter(|(_, v)| is_field(v) && Grid::find(dataset, v).is_some()).map(|(place, _)| place).collect()
 }
 
-/// Whether a variable could be a field: not one of coordinates.
+/// Whether a variable could be a field: not one of coordinates, and not one that describes a grid.
 fn is_field(variable: &Variable) -> bool {
     const STANDARD_NAMES: [&str; 4] = ["latitude", "longitude", "healpix_index", "time"];
     const NAMES: [&str; 7] = ["lat", "lon", "latitude", "longitude", "clat", "clon", "cell_ids"];
@@ -80,8 +80,8 @@ fn is_field(variable: &Variable) -> bool {
     let bounds = name.ends_with("_bnds") || name.ends_with("_bounds");
     let standard = variable.text("standard_name").is_some_and(|name| STANDARD_NAMES.contains(&name));
     let degrees = variable.text("units").is_some_and(|units| units.starts_with("degrees_"));
-    let index = variable.text("grid_name").is_some();
-    numbers && !(dimension || bounds || standard || degrees || index || NAMES.contains(&name))
+    let grid = variable.text("grid_name").or(variable.text("grid_mapping_name")).is_some();
+    numbers && !(dimension || bounds || standard || degrees || grid || NAMES.contains(&name))
 }
 
 /// The field that is meant, as a place among the dataset's variables; nothing where it is one of another grid.

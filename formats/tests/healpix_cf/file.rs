@@ -9,25 +9,25 @@ use zarrs::filesystem::FilesystemStore;
 
 /// What a file holds.
 #[derive(Clone, Default)]
-pub struct File {
-    pub variables: Vec<Variable>,
+pub(crate) struct File {
+    pub(crate) variables: Vec<Variable>,
     /// Attributes of the root.
-    pub attributes: Map<String, Value>,
+    pub(crate) attributes: Map<String, Value>,
 }
 
 /// One variable.
 #[derive(Clone)]
-pub struct Variable {
-    pub name: String,
+pub(crate) struct Variable {
+    pub(crate) name: String,
     /// Names and lengths of the dimensions.
-    pub dimensions: Vec<(String, usize)>,
-    pub values: Values,
-    pub attributes: Map<String, Value>,
+    pub(crate) dimensions: Vec<(String, usize)>,
+    pub(crate) values: Values,
+    pub(crate) attributes: Map<String, Value>,
 }
 
 /// The values of a variable.
 #[derive(Clone)]
-pub enum Values {
+pub(crate) enum Values {
     F64(Vec<f64>),
     F32(Vec<f32>),
     I64(Vec<i64>),
@@ -37,28 +37,28 @@ pub enum Values {
 
 /// Formats to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub(crate) enum Format {
     Netcdf3,
     Netcdf4,
     Zarr2,
     Zarr3,
 }
 
-pub const FORMATS: [Format; 4] = [Format::Netcdf3, Format::Netcdf4, Format::Zarr2, Format::Zarr3];
+pub(crate) const FORMATS: [Format; 4] = [Format::Netcdf3, Format::Netcdf4, Format::Zarr2, Format::Zarr3];
 
-pub fn variable(name: &str, dimensions: &[(&str, usize)], values: Values, attributes: Value) -> Variable {
+pub(crate) fn variable(name: &str, dimensions: &[(&str, usize)], values: Values, attributes: Value) -> Variable {
     let dimensions = dimensions.iter().map(|&(name, len)| (name.to_owned(), len)).collect();
     let Value::Object(attributes) = attributes else { panic!("no object") };
     Variable { name: name.to_owned(), dimensions, values, attributes }
 }
 
 impl File {
-    pub fn of(variables: impl Into<Vec<Variable>>) -> Self {
+    pub(crate) fn of(variables: impl Into<Vec<Variable>>) -> Self {
         File { variables: variables.into(), attributes: Map::new() }
     }
 
     /// Writes the file into a folder and gives its path.
-    pub fn write(&self, folder: &Path, format: Format) -> PathBuf {
+    pub(crate) fn write(&self, folder: &Path, format: Format) -> PathBuf {
         let path = folder.join(match format {
             Format::Netcdf3 => "three.nc",
             Format::Netcdf4 => "four.nc",
@@ -122,7 +122,7 @@ impl File {
     }
 
     /// Writes a Zarr store.
-    pub fn zarr(&self, path: &Path, format: Format, storage: &Storage) {
+    pub(crate) fn zarr(&self, path: &Path, format: Format, storage: &Storage) {
         std::fs::create_dir_all(path).unwrap();
         let put = |file: &str, value: Value| std::fs::write(path.join(file), value.to_string()).unwrap();
         if format == Format::Zarr2 {
@@ -151,25 +151,27 @@ impl File {
 
 /// How arrays of a Zarr store are stored.
 #[derive(Clone)]
-pub struct Storage {
+pub(crate) struct Storage {
     /// The longest chunk along any dimension.
-    pub chunk: usize,
+    pub(crate) chunk: usize,
+    /// The longest chunk along time.
+    pub(crate) steps: usize,
     /// Version 2: the compressor; version 3: all codecs.
-    pub codecs: Value,
+    pub(crate) codecs: Value,
     /// Version 2: filters.
-    pub filters: Value,
+    pub(crate) filters: Value,
     /// Version 2: the order of dimensions in a chunk.
-    pub order: &'static str,
+    pub(crate) order: &'static str,
     /// Version 2: whether numbers begin with their highest byte.
-    pub big_endian: bool,
+    pub(crate) big_endian: bool,
 }
 
 impl Storage {
     /// Without compression.
-    pub fn plain(format: Format) -> Self {
+    pub(crate) fn plain(format: Format) -> Self {
         let bytes = json!([{ "name": "bytes", "configuration": { "endian": "little" } }]);
         let codecs = if format == Format::Zarr3 { bytes } else { Value::Null };
-        Storage { chunk: 7, codecs, filters: Value::Null, order: "C", big_endian: false }
+        Storage { chunk: 20, steps: 20, codecs, filters: Value::Null, order: "C", big_endian: false }
     }
 }
 
@@ -184,16 +186,19 @@ impl Variable {
             Values::I16(_) => ("i2", "int16"),
         };
         let shape: Vec<_> = self.dimensions.iter().map(|(_, len)| *len).collect();
-        let chunks: Vec<_> = shape.iter().map(|&len| len.min(storage.chunk)).collect();
+        let longest = |name: &str| if name == "time" { storage.steps } else { storage.chunk };
+        let chunks: Vec<_> = self.dimensions.iter().map(|(name, len)| longest(name).min(*len)).collect();
         let names: Vec<_> = self.dimensions.iter().map(|(name, _)| name.clone()).collect();
         let mut attributes = self.attributes.clone();
         // As xarray writes them.
         let real = matches!(self.values, Values::F64(_) | Values::F32(_));
         if format == Format::Zarr2 {
             let fill = attributes.remove("_FillValue").unwrap_or(if real { json!("NaN") } else { Value::Null });
+            // What is read copes with it, but zarrs cannot write it.
+            let order = if shape.is_empty() { "C" } else { storage.order };
             attributes.insert("_ARRAY_DIMENSIONS".to_owned(), json!(names));
             json!({
-                "zarr_format": 2, "shape": shape, "chunks": chunks, "fill_value": fill, "order": storage.order,
+                "zarr_format": 2, "shape": shape, "chunks": chunks, "fill_value": fill, "order": order,
                 "dtype": format!("{}{two}", if storage.big_endian { '>' } else { '<' }),
                 "compressor": storage.codecs, "filters": storage.filters, "attributes": attributes,
             })
