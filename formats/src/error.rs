@@ -75,7 +75,9 @@ pub enum Error {
     },
 
     /// Not a file that any adapter reads.
-    #[error("this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed; convert it first")]
+    #[error(
+        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, and fields in NetCDF files; convert it first"
+    )]
     NotRecognised {
         /// What the content looks like.
         found: &'static str,
@@ -364,6 +366,9 @@ pub enum Error {
         /// The step, from 1.
         step: usize,
     },
+    /// A NetCDF 3 header that makes no sense.
+    #[error("the NetCDF header is damaged or cut short; fetch the file again")]
+    NetcdfHeader,
     /// A NetCDF file with less data than its header promises.
     #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
     NetcdfTruncated {
