@@ -4,6 +4,7 @@
 //! folders. Chunks and codecs are left to `zarrs`; what names and attributes mean to [`crate::cf`], what a map is to
 //! [`crate::interpret`].
 
+use std::cell::RefCell;
 use std::fs;
 use std::io;
 use std::ops::Range;
@@ -14,7 +15,8 @@ use std::sync::Arc;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::{Map, Value};
-use zarrs::array::{ArrayMetadata, ArraySubset, ElementOwned};
+use zarrs::array::chunk_cache::{ChunkCache, ChunkCacheDecodedLruSizeLimit};
+use zarrs::array::{ArrayMetadata, ArraySubset, CodecOptions, ElementOwned};
 use zarrs::filesystem::FilesystemStore;
 
 use crate::dataset::{Array, Attribute, Dataset, Dimension, Kind, Variable};
@@ -33,6 +35,9 @@ const V2_ALL: &str = ".zmetadata";
 
 /// How deep groups are followed: deeper than any that people make, and links may go round in circles.
 const DEPTH_MAX: usize = 16;
+
+/// The most bytes of chunks that are kept for the next step: 1 GiB.
+const KEPT_MAX: u64 = 1 << 30;
 
 /// Whether a folder is a Zarr store.
 pub(crate) fn is_zarr(folder: &Path) -> bool {
@@ -70,7 +75,12 @@ pub(crate) struct Zarr {
     arrays: Vec<Stored>,
     /// Paths and attributes of all groups.
     groups: Vec<(String, Vec<(String, Attribute)>)>,
+    /// Chunks of the array at this place among the variables, which was the last to be read in parts of chunks.
+    kept: RefCell<Option<(usize, Cache)>>,
 }
+
+/// Chunks that are decoded, the last ones that were needed.
+type Cache = ChunkCacheDecodedLruSizeLimit;
 
 /// How an array is stored.
 struct Stored {
@@ -98,7 +108,13 @@ impl Zarr {
         zarr_zstd::register();
         let storage = FilesystemStore::new(folder)
             .map_err(|e| Error::ZarrMetadata { node: "the root".to_owned(), problem: one_line(&e) })?;
-        let mut zarr = Zarr { storage: Arc::new(storage), variables: vec![], arrays: vec![], groups: vec![] };
+        let mut zarr = Zarr {
+            storage: Arc::new(storage),
+            variables: vec![],
+            arrays: vec![],
+            groups: vec![],
+            kept: RefCell::new(None),
+        };
         let store = folder.file_stem().unwrap_or_default().to_string_lossy();
         for node in nodes(folder)? {
             if node.is_array {
@@ -132,12 +148,30 @@ impl Dataset for Zarr {
             .map_err(|e| refused(one_line(&e)))?;
 
         let chunk = array.chunk_shape(&vec![0; ranges.len()]).map_err(|e| refused(one_line(&e)))?;
-        let chunk = chunk.iter().fold(1u128, |n, len| n.saturating_mul(len.get().into()));
-        let part = ranges.iter().fold(1u128, |n, range| n.saturating_mul(range.len() as u128));
-        room(variable, chunk.max(part))?;
-
+        let chunk: Vec<_> = chunk.iter().map(|len| len.get()).collect();
+        let product = |lens: &mut dyn Iterator<Item = u64>| lens.fold(1u128, |n, len| n.saturating_mul(len.into()));
         let ranges: Vec<_> = ranges.iter().map(|range| range.start as u64..range.end as u64).collect();
-        let part = Part { array: &array, subset: ArraySubset::new_with_ranges(&ranges), variable };
+        let part = product(&mut ranges.iter().map(|range| range.end - range.start));
+        room(variable, part.max(product(&mut chunk.iter().copied())))?;
+
+        // Chunks of several steps are needed again for the next one.
+        let again = ranges.iter().zip(&chunk).any(|(range, chunk)| range.end - range.start < *chunk);
+        let touched = ranges
+            .iter()
+            .zip(&chunk)
+            .map(|(range, chunk)| (range.end.div_ceil(*chunk) - range.start / chunk).saturating_mul(*chunk));
+        let small = product(&mut touched.into_iter()).saturating_mul(8) <= KEPT_MAX.into();
+        let sharded = stored.metadata["codecs"].to_string().contains("sharding");
+        let mut kept = self.kept.borrow_mut();
+        let cache = if again && small && !sharded {
+            if kept.as_ref().is_none_or(|(of, _)| Some(*of) != place) {
+                *kept = place.map(|place| (place, Cache::new(Arc::new(array.readable()), KEPT_MAX)));
+            }
+            kept.as_ref().map(|(_, cache)| cache)
+        } else {
+            None
+        };
+        let part = Part { array: &array, cache, subset: ArraySubset::new_with_ranges(&ranges), variable };
         Ok(match stored.element {
             "bool" => Array::Whole(part.values::<bool>()?.into_iter().map(i64::from).collect()),
             "int8" => part.whole::<i8>()?,
@@ -166,6 +200,7 @@ impl Dataset for Zarr {
 /// A part of an array that is to be read.
 struct Part<'a> {
     array: &'a zarrs::array::Array<FilesystemStore>,
+    cache: Option<&'a Cache>,
     subset: ArraySubset,
     variable: &'a Variable,
 }
@@ -175,9 +210,11 @@ impl Part<'_> {
         if self.subset.is_empty() {
             return Ok(Vec::new());
         }
-        self.array
-            .retrieve_array_subset(&self.subset)
-            .map_err(|e| Error::Zarr { array: self.variable.path(), message: one_line(&e) })
+        let read = match self.cache {
+            Some(cache) => cache.retrieve_array_subset(&self.subset, &CodecOptions::default()),
+            None => self.array.retrieve_array_subset(&self.subset),
+        };
+        read.map_err(|e| Error::Zarr { array: self.variable.path(), message: one_line(&e) })
     }
 
     fn whole<T: ElementOwned + Into<i64>>(&self) -> Result<Array, Error> {
@@ -323,6 +360,9 @@ fn array(node: Node, store: &str) -> Result<(Variable, Stored), Error> {
         }
         _ => (),
     }
+    if let Some(codecs) = metadata.get_mut("codecs") {
+        name_levels(codecs);
+    }
     if let Some(metadata) = metadata.as_object_mut() {
         metadata.remove("attributes");
         // With fewer than two dimensions both orders are the same, and `zarrs` takes "F" badly where there is none.
@@ -333,6 +373,21 @@ fn array(node: Node, store: &str) -> Result<(Variable, Stored), Error> {
     let group = if group.is_empty() { "/" } else { group };
     let variable = Variable { name: name.to_owned(), group: group.to_owned(), kind, dimensions, attributes };
     Ok((variable, Stored { path, metadata, element }))
+}
+
+/// Names the level of compression of codecs of numcodecs, which those who read do not need, but which `zarrs` does.
+fn name_levels(codecs: &mut Value) {
+    for codec in codecs.as_array_mut().into_iter().flatten() {
+        let named = codec["name"].as_str().is_some_and(|name| name.starts_with("numcodecs."));
+        if let Some(Value::Object(configuration)) = codec.get_mut("configuration") {
+            if named && !configuration.contains_key("elementsize") {
+                configuration.entry("level").or_insert(1.into());
+            }
+            if let Some(inner) = configuration.get_mut("codecs") {
+                name_levels(inner);
+            }
+        }
+    }
 }
 
 /// The type of an array's elements: its name in version 3 (empty for those that hold no field), and its kind.

@@ -86,6 +86,37 @@ fn compressors_of_version_2() {
     }
 }
 
+#[test]
+fn levels_that_are_not_named() {
+    let (file, steps) = cube();
+    for name in ["numcodecs.zlib", "numcodecs.bz2"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cube.zarr");
+        let codecs = chain(&Value::Null, "little", &json!([{"name": name, "configuration": {"level": 1}}]));
+        file.zarr(&path, Format::Zarr3, &Storage { codecs, ..storage(Format::Zarr3, 192) });
+        let metadata = path.join("t/zarr.json");
+        let mut array: Value = serde_json::from_slice(&fs::read(&metadata).unwrap()).unwrap();
+        array["codecs"][1]["configuration"] = json!({});
+        fs::write(&metadata, array.to_string()).unwrap();
+        check(&path, &steps, name);
+    }
+}
+
+#[test]
+fn chunks_of_several_steps_are_decoded_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, steps) = write(folder.path(), Format::Zarr2, &storage(Format::Zarr2, 192));
+    let mut maps = open(&path, &Selection::default()).unwrap();
+    maps.read(0).unwrap();
+    for chunk in chunks(&path) {
+        fs::write(chunk, "xx").unwrap();
+    }
+    for (step, expected) in steps.iter().enumerate() {
+        assert_same(maps.read(step).unwrap().values(), expected, "a chunk that is kept");
+    }
+    assert!(open(&path, &Selection::default()).unwrap().read(0).is_err());
+}
+
 /// Codecs of version 3, after that to bytes.
 fn codecs_3() -> Vec<Value> {
     vec![
