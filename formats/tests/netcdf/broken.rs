@@ -31,10 +31,10 @@ fn coordinates_that_are_no_degrees() {
             assert!(matches!(error, Error::CoordinateRadians { .. }), "{told}");
             assert!(told.contains(&format!("'lat' is in '{units}', but degrees are needed")), "{told}");
         }
-        for units in ["m", "km", "1", "metres"] {
+        for units in ["m", "km", "1", "metres", "new\nline"] {
             let (error, told) = told(&with_units(units, named));
             assert!(matches!(error, Error::CoordinateUnits { .. }), "{told}");
-            assert!(told.contains(&format!("'lat' is in '{units}', not degrees")), "{told}");
+            assert!(told.contains(&format!("'lat' is in '{}', not degrees", units.escape_debug())), "{told}");
         }
     }
     // Radians and metres that do not say so.
