@@ -71,8 +71,11 @@ fn noise(i: usize) -> f64 {
     ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
+/// A function of latitude and longitude in radians.
+type Function = fn(f64, f64) -> f64;
+
 /// Spherical harmonics up to degree 3, without norm.
-fn harmonics() -> [(&'static str, fn(f64, f64) -> f64); 5] {
+fn harmonics() -> [(&'static str, Function); 5] {
     [
         ("z", |lat, _| lat.sin()),
         ("z²", |lat, _| lat.sin().powi(2)),
