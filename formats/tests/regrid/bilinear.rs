@@ -132,3 +132,25 @@ fn one_column_around_the_sphere_is_a_zonal_mean() {
         assert!((value - expected).abs() < 1e-13, "{lat}: {value}");
     }
 }
+
+#[test]
+fn rows_short_of_the_poles_end_there() {
+    let grid = Grid { latitudes: vec![-50.0, -25.0, 0.0, 25.0, 50.0], longitudes: without_poles(1, 12).longitudes };
+    for (pixel, value) in grid.weights(8, Method::Bilinear).apply(&[1.0; 60], 0.0).into_iter().enumerate() {
+        assert_eq!(value.is_nan(), centre(healpix(8), pixel).0.abs() > 50.0);
+    }
+}
+
+#[test]
+fn poles_take_the_mean_over_longitude_of_uneven_columns() {
+    let longitudes = [0.0, 30.0, 40.0, 100.0, 200.0, 300.0];
+    // Half-way to the neighbours.
+    let widths = [45.0, 20.0, 35.0, 80.0, 100.0, 80.0];
+    let grid = Grid { latitudes: vec![-90.0, 90.0], longitudes: longitudes.to_vec() };
+    let field: Vec<f64> = (0..12).map(noise).collect();
+    let mean = |row: usize| (0..6).map(|column| field[6 * row + column] * widths[column]).sum::<f64>() / 360.0;
+    for (pixel, value) in grid.weights(4, Method::Bilinear).apply(&field, 1.0).into_iter().enumerate() {
+        let part = (centre(healpix(4), pixel).0 + 90.0) / 180.0;
+        assert!((value - mean(0) * (1.0 - part) - mean(1) * part).abs() < 1e-14);
+    }
+}

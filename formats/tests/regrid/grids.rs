@@ -186,13 +186,65 @@ fn halves_of_one_cell_at_both_ends() {
     }
 }
 
+/// The part of the sphere that a grid's cells cover.
+fn covered(grid: &LatLon) -> f64 {
+    let weights = Weights::new(grid, healpix(8), Method::Conservative).unwrap();
+    (0..768).flat_map(|pixel| weights.pixel(pixel)).map(|(_, weight)| weight).sum::<f64>() / 768.0
+}
+
+#[test]
+fn few_and_uneven_columns() {
+    let lat = [-45.0, 45.0];
+    // Half a turn goes as written; a repeated column closes a gap of any width.
+    for lon in [&[0.0, 90.0, 270.0][..], &[270.0, 90.0, 0.0], &[0.0, 180.0], &[0.0, 60.0, 120.0, 180.0, 360.0]] {
+        assert!((covered(&LatLon::new(&lat, None, lon, None).unwrap()) - 1.0).abs() < 1e-13, "{lon:?}");
+    }
+    // A gap of more than half a turn is none.
+    assert!((covered(&LatLon::new(&lat, None, &[0.0, 60.0, 120.0], None).unwrap()) - 0.5).abs() < 1e-13);
+}
+
+#[test]
+fn bounds_that_touch_but_for_rounding() {
+    let grid = without_poles(6, 12);
+    let bounds: Vec<f64> = (0..24).map(|i| f64::from((i + 1) / 2 * 30 - 15) + 1e-5 * noise(i as usize)).collect();
+    let rounded = LatLon::new(&grid.latitudes, None, &grid.longitudes, Some(&bounds)).unwrap();
+    assert!((covered(&rounded) - 1.0).abs() < 1e-13);
+    let field: Vec<f64> = (0..72).map(noise).collect();
+    let map = Weights::new(&rounded, healpix(8), Method::Bilinear).unwrap().apply(&field, 1.0);
+    assert_close(&map, &grid.weights(8, Method::Bilinear).apply(&field, 1.0), 1e-6, "bilinear");
+}
+
+#[test]
+fn columns_with_a_gap_do_not_go_around() {
+    let bounds = [-45.0, 45.0, 45.0, 135.0, 160.0, 225.0, 225.0, 315.0];
+    let lon = [0.0, 90.0, 180.0, 270.0];
+    let grid = LatLon::new(&[-45.0, 45.0], None, &lon, Some(&bounds)).unwrap();
+    let map = Weights::new(&grid, healpix(4), Method::Bilinear).unwrap().apply(&[1.0; 8], 0.0);
+    for (pixel, value) in map.into_iter().enumerate() {
+        let (lat, lon) = centre(healpix(4), pixel);
+        assert_eq!(value.is_nan(), lat.abs() > 45.0 || lon > 270.0);
+    }
+}
+
+#[test]
+fn a_region_holds_its_edge_whatever_the_rounding() {
+    // Of Nside 1, a pixel has its centre at longitude 90 on the equator.
+    const PIXEL: usize = 5;
+    for off in [-1e-13, 0.0, 1e-13] {
+        let lon = [90.0 + off, 100.0];
+        let (lat, bounds) = ([-off, 10.0], [90.0 + off, 95.0, 95.0, 105.0]);
+        let points = LatLon::new(&lat, None, &lon, None).unwrap();
+        let cells = LatLon::new(&[5.0, 15.0], Some(&[-off, 10.0, 20.0]), &lon, Some(&bounds)).unwrap();
+        for (grid, method) in [(points, Method::Bilinear), (cells, Method::Nearest)] {
+            let map = Weights::new(&grid, healpix(1), method).unwrap().apply(&[1.0, 2.0, 3.0, 4.0], 0.0);
+            assert!((map[PIXEL] - 1.0).abs() < 1e-12, "{method:?}, {off:e}: {}", map[PIXEL]);
+        }
+    }
+}
+
 #[test]
 fn rows_short_of_the_poles() {
-    let share = |latitudes: &[f64], longitudes: &[f64]| {
-        let grid = LatLon::new(latitudes, None, longitudes, None).unwrap();
-        let weights = Weights::new(&grid, healpix(8), Method::Conservative).unwrap();
-        (0..768).flat_map(|pixel| weights.pixel(pixel)).map(|(_, weight)| weight).sum::<f64>() / 768.0
-    };
+    let share = |lat: &[f64], lon: &[f64]| covered(&LatLon::new(lat, None, lon, None).unwrap());
     let around: Vec<f64> = (0..36).map(|i| f64::from(10 * i)).collect();
     let height = |lat: f64| lat.to_radians().sin();
     // A Gaussian grid of eight rows: its outermost ones end 5.5° from the poles, and extend to them.
