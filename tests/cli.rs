@@ -124,7 +124,7 @@ impl Folder {
 
     #[track_caller]
     pub(crate) fn read_hdu(&self, name: impl AsRef<Path>, field: &str, hdu: Option<usize>) -> Map {
-        let selection = Selection { field: Some(field.parse::<Field>().unwrap()), hdu, nside: None };
+        let selection = Selection { field: Some(field.parse::<Field>().unwrap()), hdu, ..Selection::default() };
         formats::read(&self.path(name), &selection).unwrap()
     }
 

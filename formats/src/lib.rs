@@ -5,18 +5,34 @@
 //! puts a finished file in its place. What is done with a map is left to others.
 
 mod adapter;
+mod canvas;
+mod cf;
 mod cfitsio;
+mod dataset;
 mod error;
 mod healpix;
+mod healpix_cf;
 mod healpix_fits;
+mod interpret;
+mod latlon;
+mod libnetcdf;
 mod map;
+mod multi_order;
+mod netcdf;
+mod netcdf_write;
+mod regrid;
 mod save;
+mod zarr;
+mod zarr_zstd;
 
 pub use adapter::{
-    Adapter, Description, Field, FieldDescription, Indexing, Selection, TableDescription, describe, read,
+    Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
+    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, open, read,
 };
 pub use error::Error;
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
-pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
-pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, UNSEEN, is_bad};
+pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
+pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
+pub use regrid::{LatLon, Weights};
 pub use save::{check_writable, save};

@@ -43,7 +43,8 @@ impl Input {
 
     /// The field, masked.
     pub(crate) fn read(&self, path: &Path, mask: Option<&Map>) -> anyhow::Result<Map> {
-        let selection = Selection { field: self.field.clone(), hdu: self.hdu, nside: self.nside };
+        let selection =
+            Selection { field: self.field.clone(), hdu: self.hdu, nside: self.nside, ..Selection::default() };
         let mut map = formats::read(path, &selection)?;
         if let Some(mask) = mask {
             map.apply_mask(mask, self.mask_threshold).with_context(|| shown(path))?;
