@@ -12,8 +12,10 @@ use std::str::FromStr;
 
 use flate2::read::MultiGzDecoder;
 
+use crate::csv::PointsCsv;
 use crate::healpix_fits::HealpixFits;
 use crate::map::Time;
+use crate::ply::SurfacePly;
 use crate::{CoordinateSystem, Error, Map, Ordering};
 
 /// The field of a file that is to be read.
@@ -226,7 +228,7 @@ pub trait Adapter: Sync {
 }
 
 /// All adapters; the first that recognises a file reads it.
-static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits];
+static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &SurfacePly, &PointsCsv];
 
 /// Finds what is selected of a file of any known format.
 ///
@@ -317,7 +319,8 @@ fn looks_like(head: &[u8]) -> &'static str {
     let utf8 = std::str::from_utf8(head).map_or_else(|e| e.error_len().is_none(), |_| true);
     if utf8 && head.iter().all(|&b| b >= b' ' || b"\t\r\n".contains(&b)) {
         let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
-        return if first_line.contains(&b',') { "a text file (perhaps CSV)" } else { "a text file" };
+        let csv = "a text file (perhaps CSV) without columns of longitude and latitude, or of x, y and z";
+        return if first_line.contains(&b',') { csv } else { "a text file" };
     }
     "a file of an unknown kind"
 }

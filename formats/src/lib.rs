@@ -6,18 +6,24 @@
 
 mod adapter;
 mod cfitsio;
+mod columns;
+mod csv;
 mod dataset;
+mod directions;
 mod error;
 mod healpix;
 mod healpix_fits;
 mod map;
+mod ply;
+mod points;
 mod save;
+mod surface;
 
 pub use adapter::{
     Adapter, At, Description, Field, FieldDescription, Gather, Indexing, Maps, Method, Place, Regrid, Selection,
     TableDescription, describe, open, read,
 };
-pub use error::Error;
+pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};

@@ -1,0 +1,186 @@
+//! Values at the vertices of a surface of triangles, seen from a centre.
+//!
+//! A pixel's value is that of the surface where the ray from the centre through the pixel's centre crosses it. Whether
+//! a ray crosses a triangle is decided exactly: the signs of determinants are those of exact arithmetic, and a ray
+//! through an edge or a vertex counts as moved aside a little, always in the same direction, so that it crosses one of
+//! the triangles there (simulation of simplicity, Edelsbrunner & Mücke 1990, ACM Trans. Graph. 9, 66). What is read
+//! from files is left to the adapters.
+
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use robust::{Coord3D, orient3d};
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
+
+use crate::directions::{self, Direction, chart, closest_nside, dot, from_centre, mean, places, spacing};
+use crate::error::Percent;
+use crate::{Error, Healpix, Map, Regrid};
+
+/// Boxes are wider than their triangles by this, which is above what rounding can move a direction.
+const MARGIN: f64 = 1e-12;
+
+/// A triangulated surface with values at its vertices.
+#[derive(Default)]
+pub(crate) struct Surface {
+    /// Positions of the vertices.
+    pub(crate) vertices: Vec<[f64; 3]>,
+    /// The value at each vertex, NaN where it has none.
+    pub(crate) values: Vec<f64>,
+    /// Numbers of each triangle's vertices.
+    pub(crate) triangles: Vec<[usize; 3]>,
+}
+
+/// The vertices of a surface as they are seen from a centre.
+struct View {
+    /// Directions to the vertices.
+    directions: Vec<Direction>,
+    /// Distances to the vertices.
+    distances: Vec<f64>,
+}
+
+/// A triangle's number with a box around all directions in which it is seen.
+type Boxed = GeomWithData<Rectangle<Direction>, usize>;
+
+impl Surface {
+    /// Whether each vertex is in a triangle. The others play no part.
+    fn used(&self) -> Vec<bool> {
+        let mut used = vec![false; self.vertices.len()];
+        self.triangles.iter().flatten().for_each(|&vertex| used[vertex] = true);
+        used
+    }
+
+    /// The view from a centre, the mean of the vertices unless given.
+    fn view(&self, centre: Option<[f64; 3]>) -> Result<View, Error> {
+        let used = self.used();
+        let corners: Vec<[f64; 3]> =
+            self.vertices.iter().zip(&used).filter(|(_, used)| **used).map(|(v, _)| *v).collect();
+        let centre = directions::centre(centre, corners.into_iter())?;
+        let mut view = View { directions: Vec::new(), distances: Vec::new() };
+        for (i, (&vertex, used)) in self.vertices.iter().zip(used).enumerate() {
+            let (direction, distance) = match from_centre(vertex, centre) {
+                Some(seen) => seen,
+                None if used => return Err(Error::AtCentre { place: format!("vertex {i} (from 0)") }),
+                None => ([0.0; 3], 0.0),
+            };
+            view.directions.push(direction);
+            view.distances.push(distance);
+        }
+        Ok(view)
+    }
+
+    /// The Nside whose pixels are closest to the typical distance between vertices, see [`crate::directions::spacing`].
+    pub(crate) fn nside(&self, centre: Option<[f64; 3]>) -> Result<usize, Error> {
+        self.nside_of(&self.view(centre)?)
+    }
+
+    fn nside_of(&self, view: &View) -> Result<usize, Error> {
+        let used = view.directions.iter().zip(self.used()).filter(|(_, used)| *used).map(|(d, _)| *d);
+        spacing(&places(used)).map(closest_nside).ok_or(Error::OnePlace)
+    }
+
+    /// Makes a map of the values, which are linear within each triangle. A pixel in a triangle that has a vertex without
+    /// a value is masked.
+    ///
+    /// The Nside is that of [`Surface::nside`] unless given, the centre the mean of the vertices.
+    ///
+    /// # Errors
+    /// [`Error::Crossings`] unless each pixel's ray crosses the surface once, or folds are allowed.
+    pub(crate) fn map(&self, nside: Option<usize>, regrid: &Regrid) -> Result<Map, Error> {
+        let view = self.view(regrid.centre)?;
+        let grid = Healpix::new(nside.map_or_else(|| self.nside_of(&view), Ok)?)?;
+        let boxed = |(i, triangle): (usize, &[usize; 3])| Boxed::new(view.rectangle(*triangle), i);
+        let tree = RTree::bulk_load(self.triangles.iter().enumerate().map(boxed).collect());
+        let (never, several) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let map = chart(grid, |_, direction| {
+            let candidates = tree.locate_in_envelope_intersecting(AABB::from_point(direction));
+            let mut crossings = 0;
+            let mut outermost = (f64::INFINITY, usize::MAX, f64::NAN);
+            for triangle in candidates.map(|boxed| boxed.data) {
+                let vertices = self.triangles[triangle];
+                let Some(weights) = view.crossing(vertices, direction) else { continue };
+                crossings += 1;
+                let nearness = view.nearness(vertices, weights);
+                // Of triangles that lie upon each other the first.
+                if (nearness, triangle) < (outermost.0, outermost.1) {
+                    let values = vertices.map(|vertex| self.values[vertex]);
+                    outermost = (nearness, triangle, dot(weights, values) / weights.iter().sum::<f64>());
+                }
+            }
+            match crossings {
+                0 => never.fetch_add(1, Relaxed),
+                1 => 0,
+                _ => several.fetch_add(1, Relaxed),
+            };
+            outermost.2
+        })?;
+        let (never, several) = (never.into_inner(), several.into_inner());
+        if regrid.allow_folds || never + several == 0 {
+            return Ok(map);
+        }
+        let percent = |pixels| Percent { pixels, of: grid.pixels() };
+        Err(Error::Crossings { never: percent(never), several: percent(several) })
+    }
+}
+
+impl View {
+    /// The weights, of any sum, of a triangle's vertices in the point where a ray crosses it; nothing where it does not.
+    fn crossing(&self, vertices: [usize; 3], ray: Direction) -> Option<[f64; 3]> {
+        let [a, b, c] = vertices.map(|vertex| self.directions[vertex]);
+        let opposite_a = Side::of(b, c, ray);
+        let opposite_b = Side::of(c, a, ray);
+        if opposite_a.sign == 0.0 || opposite_b.sign != opposite_a.sign {
+            return None;
+        }
+        let opposite_c = Side::of(a, b, ray);
+        if opposite_c.sign != opposite_a.sign {
+            return None;
+        }
+        // The ray as a sum of directions to the vertices, and so of their positions.
+        let parts = [opposite_a, opposite_b, opposite_c].map(|side| side.determinant.abs());
+        Some(std::array::from_fn(|i| parts[i] / self.distances[vertices[i]]))
+    }
+
+    /// The inverse of the distance at which a ray with these weights crosses a triangle.
+    fn nearness(&self, vertices: [usize; 3], weights: [f64; 3]) -> f64 {
+        let [a, b, c] = vertices.map(|vertex| self.directions[vertex]);
+        weights.iter().sum::<f64>() / determinant(a, b, c).abs()
+    }
+
+    /// A box around all directions in which a triangle is seen.
+    fn rectangle(&self, vertices: [usize; 3]) -> Rectangle<Direction> {
+        let corners = vertices.map(|vertex| self.directions[vertex]);
+        let middle = from_centre(mean(corners.into_iter()), [0.0; 3]).map_or([0.0; 3], |(middle, _)| middle);
+        let squared = |corner: Direction| (0..3).map(|i| (corner[i] - middle[i]).powi(2)).sum::<f64>();
+        let radius = corners.into_iter().map(squared).fold(0.0, f64::max).sqrt() + MARGIN;
+        // The disc about the middle with all corners holds the triangle if it is less than a hemisphere.
+        if middle == [0.0; 3] || radius >= 1.4 {
+            return Rectangle::from_corners([-1.0 - MARGIN; 3], [1.0 + MARGIN; 3]);
+        }
+        Rectangle::from_corners(middle.map(|m| m - radius), middle.map(|m| m + radius))
+    }
+}
+
+/// Where a ray passes the plane through the centre and an edge.
+#[derive(Clone, Copy)]
+struct Side {
+    /// The determinant of the edge's directions and the ray.
+    determinant: f64,
+    /// Its sign, 1 or −1; for a ray in the plane that of the ray moved aside; 0 where the edge makes no plane.
+    sign: f64,
+}
+
+impl Side {
+    fn of(from: Direction, to: Direction, ray: Direction) -> Self {
+        let found = determinant(from, to, ray);
+        // Moved aside by ever smaller steps along the axes.
+        let aside = || [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| determinant(from, to, axis));
+        let first = if found != 0.0 { found } else { aside().into_iter().find(|&d| d != 0.0).unwrap_or(0.0) };
+        Side { determinant: found, sign: if first == 0.0 { 0.0 } else { first.signum() } }
+    }
+}
+
+/// The determinant of three directions, with the sign that exact arithmetic gives it.
+fn determinant(a: Direction, b: Direction, c: Direction) -> f64 {
+    let point = |[x, y, z]: Direction| Coord3D { x, y, z };
+    orient3d(point(a), point(b), point(c), point([0.0; 3]))
+}
