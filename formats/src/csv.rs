@@ -152,9 +152,17 @@ impl Header {
             }
             let mut columns: Vec<Column> = cells.iter().map(|cell| column(&String::from_utf8_lossy(cell))).collect();
             if let Some((position, system)) = position(&columns)? {
-                for column in &mut columns {
-                    // A column without a name counts the rows, as pandas writes it.
-                    column.values = !column.heading.is_empty() && coordinate(column).is_none();
+                let coordinates: Vec<_> =
+                    columns.iter().map(|c| coordinate(c).map(|(coordinate, _)| coordinate)).collect();
+                let in_space = (0..3).all(|axis| coordinates.contains(&Some(Coordinate::Axis(axis))));
+                for (column, coordinate) in columns.iter_mut().zip(coordinates) {
+                    column.values = match coordinate {
+                        // A column without a name counts the rows, as pandas writes it.
+                        None => !column.heading.is_empty(),
+                        // One of x, y and z alone is a value.
+                        Some(Coordinate::Axis(_)) => !in_space,
+                        Some(_) => false,
+                    };
                 }
                 return Ok(Some(Header { delimiter, columns, position, system, offset }));
             }

@@ -97,13 +97,12 @@ impl Surface {
             let mut outermost = (f64::INFINITY, usize::MAX, f64::NAN);
             for triangle in candidates.map(|boxed| boxed.data) {
                 let vertices = self.triangles[triangle];
-                let Some(weights) = view.crossing(vertices, direction) else { continue };
+                let Some((nearness, weights)) = view.crossing(vertices, direction) else { continue };
                 crossings += 1;
-                let nearness = view.nearness(vertices, weights);
                 // Of triangles that lie upon each other the first.
                 if (nearness, triangle) < (outermost.0, outermost.1) {
                     let values = vertices.map(|vertex| self.values[vertex]);
-                    outermost = (nearness, triangle, dot(weights, values) / weights.iter().sum::<f64>());
+                    outermost = (nearness, triangle, dot(weights, values) / nearness);
                 }
             }
             match crossings {
@@ -123,27 +122,19 @@ impl Surface {
 }
 
 impl View {
-    /// The weights, of any sum, of a triangle's vertices in the point where a ray crosses it; nothing where it does not.
-    fn crossing(&self, vertices: [usize; 3], ray: Direction) -> Option<[f64; 3]> {
+    /// Where a ray crosses a triangle: the inverse of the distance, and the weights of the vertices, whose sum it is.
+    fn crossing(&self, vertices: [usize; 3], ray: Direction) -> Option<(f64, [f64; 3])> {
         let [a, b, c] = vertices.map(|vertex| self.directions[vertex]);
-        let opposite_a = Side::of(b, c, ray);
-        let opposite_b = Side::of(c, a, ray);
-        if opposite_a.sign == 0.0 || opposite_b.sign != opposite_a.sign {
-            return None;
-        }
-        let opposite_c = Side::of(a, b, ray);
-        if opposite_c.sign != opposite_a.sign {
-            return None;
-        }
+        let whole = determinant(a, b, c);
+        // Behind the centre, all three are on the other side.
+        let inside = |side: &Side| side.sign * whole > 0.0;
+        let opposite_a = Some(Side::of(b, c, ray)).filter(inside)?;
+        let opposite_b = Some(Side::of(c, a, ray)).filter(inside)?;
+        let opposite_c = Some(Side::of(a, b, ray)).filter(inside)?;
         // The ray as a sum of directions to the vertices, and so of their positions.
-        let parts = [opposite_a, opposite_b, opposite_c].map(|side| side.determinant.abs());
-        Some(std::array::from_fn(|i| parts[i] / self.distances[vertices[i]]))
-    }
-
-    /// The inverse of the distance at which a ray with these weights crosses a triangle.
-    fn nearness(&self, vertices: [usize; 3], weights: [f64; 3]) -> f64 {
-        let [a, b, c] = vertices.map(|vertex| self.directions[vertex]);
-        weights.iter().sum::<f64>() / determinant(a, b, c).abs()
+        let parts = [opposite_a, opposite_b, opposite_c].map(|side| side.determinant / whole);
+        let weights: [f64; 3] = std::array::from_fn(|i| parts[i] / self.distances[vertices[i]]);
+        Some((weights.iter().sum(), weights))
     }
 
     /// A box around all directions in which a triangle is seen.
@@ -183,4 +174,106 @@ impl Side {
 fn determinant(a: Direction, b: Direction, c: Direction) -> f64 {
     let point = |[x, y, z]: Direction| Coord3D { x, y, z };
     orient3d(point(a), point(b), point(c), point([0.0; 3]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An octahedron each of whose triangles is cut into four, several times.
+    fn sphere(levels: usize) -> Surface {
+        let mut vertices: Vec<[f64; 3]> = Vec::new();
+        let mut number = |v: [f64; 3]| {
+            vertices.iter().position(|w| *w == v).unwrap_or_else(|| {
+                vertices.push(v);
+                vertices.len() - 1
+            })
+        };
+        let mut triangles = Vec::new();
+        for sign in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+            for z in [1.0, -1.0] {
+                triangles.push([[sign[0], 0.0, 0.0], [0.0, sign[1], 0.0], [0.0, 0.0, z]]);
+            }
+        }
+        for _ in 0..levels {
+            let middle = |a: [f64; 3], b: [f64; 3]| {
+                let sum: [f64; 3] = std::array::from_fn(|i| a[i] + b[i]);
+                sum.map(|c| c / dot(sum, sum).sqrt())
+            };
+            triangles = triangles
+                .into_iter()
+                .flat_map(|[a, b, c]| {
+                    let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                    [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+                })
+                .collect();
+        }
+        let triangles: Vec<[usize; 3]> = triangles.into_iter().map(|t| t.map(&mut number)).collect();
+        Surface { values: vec![1.0; vertices.len()], vertices, triangles }
+    }
+
+    /// How many triangles a ray crosses.
+    fn crossings(surface: &Surface, view: &View, ray: Direction) -> usize {
+        surface.triangles.iter().filter(|&&triangle| view.crossing(triangle, ray).is_some()).count()
+    }
+
+    #[test]
+    fn rays_through_vertices_and_edges_cross_once() {
+        for (centre, turned) in [([0.0; 3], false), ([0.1, -0.2, 0.05], false), ([0.0; 3], true)] {
+            let mut surface = sphere(3);
+            if turned {
+                for [x, y, z] in &mut surface.vertices {
+                    (*x, *y, *z) = (0.6 * *x - 0.8 * *y, 0.8 * *x + 0.6 * *y, *z * 0.3);
+                }
+            }
+            let view = surface.view(Some(centre)).unwrap();
+            let mut rays = view.directions.clone();
+            for &[a, b, c] in &surface.triangles {
+                let [a, b, c] = [a, b, c].map(|vertex| view.directions[vertex]);
+                let between = |sum: [f64; 3]| from_centre(sum, [0.0; 3]).unwrap().0;
+                rays.push(between(std::array::from_fn(|i| a[i] + b[i])));
+                rays.push(between(std::array::from_fn(|i| a[i] + b[i] + c[i])));
+                // As close to a vertex as there are numbers.
+                rays.push(between(std::array::from_fn(|i| a[i] + 1e-16 * b[i])));
+                rays.push(between(std::array::from_fn(|i| a[i] * (1.0 + f64::EPSILON) + 1e-17 * c[i])));
+            }
+            assert!(rays.len() > 2000);
+            for ray in rays {
+                assert_eq!(crossings(&surface, &view, ray), 1, "{ray:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_hold_the_triangles_that_rays_cross() {
+        for levels in [0, 1, 3] {
+            let surface = sphere(levels);
+            for centre in [[0.0; 3], [0.3, 0.3, -0.3]] {
+                let view = surface.view(Some(centre)).unwrap();
+                let grid = Healpix::new(8).unwrap();
+                chart(grid, |_, ray| {
+                    for &triangle in &surface.triangles {
+                        if view.crossing(triangle, ray).is_some() {
+                            let (lower, upper) = (view.rectangle(triangle).lower(), view.rectangle(triangle).upper());
+                            assert!((0..3).all(|i| lower[i] <= ray[i] && ray[i] <= upper[i]));
+                        }
+                    }
+                    assert_eq!(crossings(&surface, &view, ray), 1);
+                    0.0
+                })
+                .unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_without_area_are_not_crossed() {
+        let vertices = vec![[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]];
+        let surface =
+            Surface { values: vec![0.0; 5], vertices, triangles: vec![[0, 1, 2], [0, 0, 2], [0, 2, 3], [0, 4, 2]] };
+        let view = surface.view(Some([0.0; 3])).unwrap();
+        for &ray in view.directions.iter().chain(&[[0.0, 0.0, 1.0], [0.6, 0.8, 0.0]]) {
+            assert_eq!(crossings(&surface, &view, ray), 0);
+        }
+    }
 }
