@@ -65,6 +65,11 @@ pub(crate) fn sphere(levels: usize) -> Mesh {
     mesh.with_values(harmonic)
 }
 
+/// A binary file.
+pub(crate) fn binary(mesh: &Mesh) -> Vec<u8> {
+    Layout { format: "binary_little_endian", ..Layout::default() }.write(mesh)
+}
+
 /// A field of the second degree, in single precision.
 fn harmonic([x, y, z]: [f64; 3]) -> f64 {
     f64::from((0.3 + x - 2.0 * y + 3.0 * x * z) as f32)
