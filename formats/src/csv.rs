@@ -52,7 +52,7 @@ impl Adapter for PointsCsv {
 
     fn recognises(&self, head: &[u8]) -> bool {
         // A table of coordinates of which either could be meant is one too, with an error of its own.
-        !head.contains(&0) && !matches!(Header::find(&mut io::Cursor::new(head)), Err(Error::NoCoordinates))
+        !head.contains(&0) && !matches!(Header::find(&mut io::Cursor::new(head)), Err(Error::NoPointColumns))
     }
 
     fn describe(&self, path: &Path) -> Result<Description, Error> {
@@ -136,7 +136,7 @@ impl Header {
                 if let Some(header) = Header::parse(text, offset + read)? {
                     return Ok(header);
                 }
-                return Header::parse(&comment, offset)?.ok_or(Error::NoCoordinates);
+                return Header::parse(&comment, offset)?.ok_or(Error::NoPointColumns);
             }
             offset += read;
         }
@@ -226,7 +226,7 @@ fn position(columns: &[Column]) -> Result<Option<(Position, Option<CoordinateSys
         let Some((longitude, latitude)) = pair else { continue };
         for i in [longitude, latitude] {
             if coordinates[i].as_ref().is_some_and(|(_, unit)| RADIANS.contains(&unit.as_str())) {
-                return Err(Error::Radians { column: shown(&columns[i].heading) });
+                return Err(Error::RadianColumn { column: shown(&columns[i].heading) });
             }
         }
         return Ok(Some((Position::Angles { longitude, latitude }, *system)));
@@ -285,7 +285,10 @@ impl Table {
             let read = text.read_until(b'\n', &mut line).map_err(Error::io("read it"))? as u64;
             number += 1;
             at += read;
-            if read == 0 || at > self.header.offset + row && !line.trim_ascii().is_empty() && !line.starts_with(b"#") {
+            // What the reader has not yet read of this line.
+            let unread = at.saturating_sub(self.header.offset + row).min(line.len() as u64);
+            let rest = &line[line.len() - unread as usize..];
+            if read == 0 || !rest.trim_ascii().is_empty() && !rest.starts_with(b"#") {
                 return Ok(format!("line {number}"));
             }
         }

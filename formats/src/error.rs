@@ -339,7 +339,7 @@ pub enum Error {
     #[error(
         "no line of this text names columns of longitude and latitude, or of x, y and z; add a line such as 'lon,lat,value' before the numbers"
     )]
-    NoCoordinates,
+    NoPointColumns,
     /// Two columns of which either could be the one that is needed.
     #[error("columns '{first}' and '{second}' could both be the {coordinate}; rename one of them")]
     TwoCoordinates {
@@ -352,7 +352,7 @@ pub enum Error {
     },
     /// Angles that are not in degrees.
     #[error("the angles in column '{column}' are in radians; convert them to degrees")]
-    Radians {
+    RadianColumn {
         /// The column.
         column: String,
     },
