@@ -15,6 +15,7 @@ use flate2::read::MultiGzDecoder;
 use crate::csv::PointsCsv;
 use crate::healpix_fits::HealpixFits;
 use crate::map::Time;
+use crate::netcdf::Netcdf;
 use crate::ply::SurfacePly;
 use crate::{CoordinateSystem, Error, Map, Ordering};
 
@@ -150,6 +151,14 @@ pub trait Maps {
     /// # Errors
     /// Where the file cannot be read.
     fn read(&mut self, step: usize) -> Result<Map, Error>;
+
+    /// Reads the values of one map as the file has them, whatever their grid, but unpacked; NaN where missing.
+    ///
+    /// # Errors
+    /// Where the file cannot be read.
+    fn values(&mut self, step: usize) -> Result<Vec<f64>, Error> {
+        self.read(step).map(Map::into_values)
+    }
 }
 
 /// What a file holds.
@@ -157,31 +166,128 @@ pub trait Maps {
 pub struct Description {
     /// The file format.
     pub format: &'static str,
-    /// The tables that hold maps, in the file's order.
+    /// The tables or variables that hold maps, in the file's order.
     pub tables: Vec<TableDescription>,
 }
 
-/// What one table of a file holds.
+/// What one table or variable of a file holds.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct TableDescription {
-    /// Number of the HDU, 0 for the primary one.
-    pub hdu: usize,
-    /// Name of the extension.
-    pub name: Option<String>,
-    /// Nside of the grid; of a multi-order table that of the finest cells.
-    pub nside: usize,
-    /// The ordering.
-    pub ordering: Ordering,
-    /// Whether the file does not say its ordering, so that RING is assumed.
-    pub ordering_assumed: bool,
-    /// The coordinate system, where the file names one.
-    pub coordinates: Option<CoordinateSystem>,
-    /// How values are tied to pixels.
-    pub indexing: Indexing,
-    /// Number of pixels (of a multi-order table: cells) that the table has values for.
-    pub pixels: usize,
-    /// The data columns.
+    /// Where it is in the file.
+    #[serde(flatten)]
+    pub place: TablePlace,
+    /// The grid.
+    #[serde(flatten)]
+    pub grid: GridDescription,
+    /// The dimensions other than those of the sphere.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dimensions: Vec<DimensionDescription>,
+    /// The data columns, or the one field of a variable.
     pub fields: Vec<FieldDescription>,
+}
+
+/// Where a table or variable is in its file.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(untagged)]
+pub enum TablePlace {
+    /// In an HDU of a FITS file.
+    Hdu {
+        /// Number of the HDU, 0 for the primary one.
+        hdu: usize,
+        /// Name of the extension.
+        name: Option<String>,
+    },
+    /// In a variable of its own.
+    Variable {
+        /// The path of the variable: its name, after its group's.
+        variable: String,
+    },
+    /// The whole of a file that has but one.
+    File {},
+}
+
+/// The grid of a table or variable.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(untagged)]
+pub enum GridDescription {
+    /// HEALPix.
+    Healpix {
+        /// Nside of the grid; of a multi-order table that of the finest cells.
+        nside: usize,
+        /// The ordering.
+        ordering: Ordering,
+        /// Whether the file does not say its ordering, so that RING is assumed.
+        ordering_assumed: bool,
+        /// The coordinate system, where the file names one.
+        coordinates: Option<CoordinateSystem>,
+        /// How values are tied to pixels.
+        indexing: Indexing,
+        /// Number of pixels (of a multi-order table: cells) that the table has values for.
+        pixels: usize,
+    },
+    /// Latitudes and longitudes.
+    LatLon {
+        /// The latitudes, in degrees.
+        latitudes: AxisDescription,
+        /// The longitudes, in degrees.
+        longitudes: AxisDescription,
+        /// Whether the cells cover the sphere.
+        global: bool,
+    },
+    /// Points anywhere.
+    Points {
+        /// Their number.
+        points: usize,
+        /// The coordinate system, where the file names one.
+        coordinates: Option<CoordinateSystem>,
+        /// The typical distance between them, in degrees.
+        spacing: Option<f64>,
+        /// The Nside that is used unless one is given.
+        nside: Option<usize>,
+        /// The share of the sphere that is as near to a point as it must be, unless a reach is given.
+        covered: Option<f64>,
+    },
+    /// A surface of triangles.
+    Surface {
+        /// The number of vertices.
+        vertices: usize,
+        /// The number of triangles.
+        triangles: usize,
+        /// The point that it is seen from unless one is given.
+        centre: [f64; 3],
+        /// The Nside that is used unless one is given.
+        nside: usize,
+        /// The share of the sphere in which it is seen from there.
+        covered: f64,
+        /// The share of the sphere in which it is seen more than once.
+        folded: f64,
+    },
+}
+
+/// The values of a coordinate.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct AxisDescription {
+    /// How many they are.
+    pub count: usize,
+    /// The first.
+    pub first: f64,
+    /// The last.
+    pub last: f64,
+    /// The distance from one to the next, where it is always the same.
+    pub spacing: Option<f64>,
+}
+
+/// A dimension other than those of the sphere.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct DimensionDescription {
+    /// Its name.
+    pub name: String,
+    /// Its length.
+    pub len: usize,
+    /// Whether it is time, so that there is a map for each place.
+    pub time: bool,
+    /// The values of its coordinate and their unit, abbreviated.
+    pub values: String,
 }
 
 /// How a table ties values to pixels.
@@ -203,6 +309,9 @@ pub struct FieldDescription {
     pub name: String,
     /// Its unit, where the file names one.
     pub unit: Option<String>,
+    /// What it is in words, where the file says it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub long_name: Option<String>,
 }
 
 /// A reader of one family of files.
@@ -228,7 +337,7 @@ pub trait Adapter: Sync {
 }
 
 /// All adapters; the first that recognises a file reads it.
-static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &SurfacePly, &PointsCsv];
+static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &Netcdf, &SurfacePly, &PointsCsv];
 
 /// Finds what is selected of a file of any known format.
 ///
@@ -291,10 +400,6 @@ pub(crate) fn is_gzip(head: &[u8]) -> bool {
 /// In words, what a file that begins with `head` looks like.
 fn looks_like(head: &[u8]) -> &'static str {
     const MAGIC: &[(&[u8], &str)] = &[
-        (b"\x89HDF\r\n\x1a\n", "an HDF5 or NetCDF-4 file"),
-        (b"CDF\x01", "a NetCDF file"),
-        (b"CDF\x02", "a NetCDF file"),
-        (b"CDF\x05", "a NetCDF file"),
         (b"GRIB", "a GRIB file"),
         (b"PK\x03\x04", "a ZIP archive (or NumPy .npz)"),
         (b"\x93NUMPY", "a NumPy .npy array"),

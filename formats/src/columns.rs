@@ -2,7 +2,7 @@
 //!
 //! What else columns may be (coordinates, colours) is left to the adapters.
 
-use crate::{Error, Field};
+use crate::{Description, Error, Field, FieldDescription, GridDescription, Selection, TableDescription, TablePlace};
 
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +52,23 @@ fn named(columns: &[Column], name: &str) -> Vec<usize> {
         }];
     let found = matches.iter().map(|matches| (0..columns.len()).filter(|&i| matches(&columns[i])).collect::<Vec<_>>());
     found.into_iter().find(|found| !found.is_empty()).unwrap_or_default()
+}
+
+/// What a file holds whose columns are these.
+pub(crate) fn describe(format: &'static str, grid: GridDescription, columns: &[Column]) -> Description {
+    let field = |c: &Column| FieldDescription { name: c.name.clone(), unit: c.unit.clone(), long_name: None };
+    let fields = columns.iter().filter(|c| c.values).map(field).collect();
+    let table = TableDescription { place: TablePlace::File {}, grid, dimensions: Vec::new(), fields };
+    Description { format, tables: vec![table] }
+}
+
+/// Whether a selection is one of points, which have neither dimensions nor HDUs.
+pub(crate) fn check(selection: &Selection) -> Result<(), Error> {
+    if let Some(hdu) = selection.hdu {
+        return Err(Error::NoHdus { hdu });
+    }
+    let at = selection.at.first();
+    at.map_or(Ok(()), |at| Err(Error::NoDimension { dimension: shown(&at.dimension) }))
 }
 
 /// The columns of values with their numbers, for people.

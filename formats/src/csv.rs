@@ -56,14 +56,14 @@ impl Adapter for PointsCsv {
     }
 
     fn describe(&self, path: &Path) -> Result<Description, Error> {
-        Table::open(path)?;
-        Ok(Description { format: self.name(), tables: Vec::new() })
+        let table = Table::open(path)?;
+        // All points are counted, whatever values they have.
+        let samples = table.samples(table.header.position.columns()[0], None)?;
+        Ok(columns::describe(self.name(), samples.describe(table.header.system)?, &table.header.columns))
     }
 
     fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
-        if let Some(at) = selection.at.first() {
-            return Err(Error::NoDimension { dimension: shown(&at.dimension) });
-        }
+        columns::check(selection)?;
         let mut table = Table::open(path)?;
         let values = columns::choose(&table.header.columns, selection.field.as_ref())?;
         let samples = table.samples(values, selection.regrid.centre)?;
@@ -94,6 +94,10 @@ impl Maps for One {
         map.coordinates = self.system;
         Ok(map)
     }
+
+    fn values(&mut self, _: usize) -> Result<Vec<f64>, Error> {
+        Ok(self.samples.values.clone())
+    }
 }
 
 /// What the text up to the numbers says.
@@ -110,6 +114,16 @@ struct Header {
 enum Position {
     Angles { longitude: usize, latitude: usize },
     Cartesian([usize; 3]),
+}
+
+impl Position {
+    /// The columns.
+    fn columns(&self) -> Vec<usize> {
+        match *self {
+            Position::Angles { longitude, latitude } => vec![longitude, latitude],
+            Position::Cartesian(axes) => axes.to_vec(),
+        }
+    }
 }
 
 /// What a column may say of a point's place.
@@ -354,10 +368,10 @@ impl Table {
             Some(number) if !number.is_nan() => Err(bad(i, expected)),
             _ => Err(bad(i, NUMBER)),
         };
-        let says_nothing = |places: &[usize]| value.is_nan() && places.iter().all(|&i| is_missing(&row[i]));
+        if value.is_nan() && self.header.position.columns().iter().all(|&i| is_missing(&row[i])) {
+            return Ok(None);
+        }
         let point = match self.header.position {
-            Position::Angles { longitude, latitude } if says_nothing(&[longitude, latitude]) => return Ok(None),
-            Position::Cartesian(axes) if says_nothing(&axes) => return Ok(None),
             Position::Angles { longitude, latitude } => at(
                 read(longitude, 360.0, "between -360 and 360 degrees")?.to_radians(),
                 read(latitude, 90.0, "between -90 and 90 degrees")?.to_radians(),

@@ -335,6 +335,215 @@ pub enum Error {
         gibibytes: f64,
     },
 
+    /// The NetCDF library refused.
+    #[error("cannot {action}: the NetCDF library says \"{message}\"; check the file with ncdump -h")]
+    Netcdf {
+        /// What was attempted.
+        action: String,
+        /// libnetcdf's words for what is wrong.
+        message: String,
+    },
+    /// A NetCDF file with less data than its header promises.
+    #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
+    NetcdfTruncated {
+        /// The size that the header implies, in bytes.
+        needed: u128,
+        /// The file's size in bytes.
+        found: u64,
+    },
+    /// A variable too large for the memory.
+    #[error("'{variable}' needs {gibibytes:.1} GiB, more memory than there is; choose a part of it with --select")]
+    VariableMemory {
+        /// The variable, or the attribute.
+        variable: String,
+        /// The memory needed.
+        gibibytes: f64,
+    },
+    /// A variable that holds no numbers.
+    #[error("variable '{variable}' holds {found}, which is not a field of numbers; choose another variable")]
+    VariableKind {
+        /// The variable.
+        variable: String,
+        /// What it holds.
+        found: &'static str,
+    },
+    /// An attribute with an impossible value.
+    #[error(
+        "variable '{variable}' has {attribute} = {found}, which is not {expected}; correct it, such as with ncatted"
+    )]
+    AttributeValue {
+        /// The variable.
+        variable: String,
+        /// The attribute.
+        attribute: &'static str,
+        /// Its value.
+        found: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// No variable that could be a map.
+    #[error("no variable has dimensions of latitude and longitude in degrees; the variables are {variables}")]
+    NoLatLon {
+        /// The variables and their dimensions.
+        variables: String,
+    },
+    /// Several variables that could be meant.
+    #[error("there are several variables, so name one with --variable: {variables}")]
+    SeveralVariables {
+        /// The variables, their dimensions and units.
+        variables: String,
+    },
+    /// A variable that is not there, or is no map.
+    #[error("there is no variable {variable} with latitude and longitude; those that have them are {variables}")]
+    UnknownVariable {
+        /// The name or number asked for.
+        variable: String,
+        /// The variables that have them.
+        variables: String,
+    },
+    /// A dimension without places.
+    #[error(
+        "dimension '{dimension}' of variable '{variable}' has length 0, so there is nothing to read; check how the file was made"
+    )]
+    EmptyDimension {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+    },
+    /// Coordinates over two dimensions.
+    #[error(
+        "variable '{variable}' is on a curvilinear grid, whose coordinate '{coordinate}' has two dimensions, but only rectilinear ones are read; regrid it first, such as with cdo remapbil,global_1"
+    )]
+    Curvilinear {
+        /// The variable.
+        variable: String,
+        /// The coordinate.
+        coordinate: String,
+    },
+    /// A latitude and a longitude for each place of one dimension.
+    #[error(
+        "variable '{variable}' is on an unstructured grid, whose latitudes and longitudes both run along '{dimension}', but only rectilinear ones are read; regrid it first, such as with cdo remapnn,global_1"
+    )]
+    Unstructured {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+    },
+    /// Coordinates of a rotated or projected grid.
+    #[error(
+        "coordinate '{coordinate}' is a {found}, not a latitude or longitude; regrid the field first, such as with cdo remapbil,global_1"
+    )]
+    OtherAxis {
+        /// The coordinate.
+        coordinate: String,
+        /// Its standard name.
+        found: String,
+    },
+    /// Coordinates in radians.
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', but degrees are needed; multiply it by 180/pi and set its units to degrees, such as with ncap2"
+    )]
+    CoordinateRadians {
+        /// The coordinate.
+        coordinate: String,
+        /// Its unit.
+        units: String,
+    },
+    /// Coordinates in metres or other units.
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', not degrees; bring the field to a grid of latitude and longitude first, such as with gdalwarp -t_srs EPSG:4326"
+    )]
+    CoordinateUnits {
+        /// The coordinate.
+        coordinate: String,
+        /// Its unit.
+        units: String,
+    },
+    /// A dimension to choose along that is not there.
+    #[error("variable '{variable}' has no dimension '{dimension}' to choose along; its dimensions are {dimensions}")]
+    NoSuchDimension {
+        /// The variable.
+        variable: String,
+        /// The name asked for.
+        dimension: String,
+        /// The dimensions and their lengths.
+        dimensions: String,
+    },
+    /// A place chosen along latitude or longitude.
+    #[error("dimension '{dimension}' runs over the sphere, all of which is read; leave it out of --select")]
+    SphereDimension {
+        /// The dimension.
+        dimension: String,
+    },
+    /// Two choices along one dimension.
+    #[error("dimension '{dimension}' is chosen along twice; leave one --select out")]
+    SelectedTwice {
+        /// The dimension.
+        dimension: String,
+    },
+    /// A value that a coordinate does not have.
+    #[error("there is no {dimension} = {place}; the values are {values}")]
+    NoSuchPlace {
+        /// The dimension.
+        dimension: String,
+        /// The value asked for.
+        place: String,
+        /// The values.
+        values: String,
+    },
+    /// A value that a coordinate has more than once.
+    #[error(
+        "{dimension} = {place} is met {count} times; choose one by its number, such as --select {dimension}=#{first}"
+    )]
+    SeveralPlaces {
+        /// The dimension.
+        dimension: String,
+        /// The value asked for.
+        place: String,
+        /// How often.
+        count: usize,
+        /// The number of the first.
+        first: usize,
+    },
+    /// A place beyond a dimension.
+    #[error("there is no {dimension} = #{index}; they are numbered from #0 to #{last}")]
+    IndexRange {
+        /// The dimension.
+        dimension: String,
+        /// The number asked for.
+        index: usize,
+        /// The last number.
+        last: usize,
+    },
+    /// A dimension along which nothing is chosen.
+    #[error(
+        "variable '{variable}' has several values along '{dimension}': {values}; choose one with --select {dimension}=VALUE"
+    )]
+    DimensionLeft {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+        /// The values.
+        values: String,
+    },
+    /// An HDU asked of a file that has none.
+    #[error("there is no HDU {hdu} in a file of this format; leave --hdu out")]
+    NoHdus {
+        /// The HDU asked for.
+        hdu: usize,
+    },
+    /// A number beyond those of 64 bits with a sign.
+    #[error("variable '{variable}' holds {value}, beyond 2^63 - 1; store it as a signed or a real number")]
+    LargeNumber {
+        /// The variable.
+        variable: String,
+        /// The number.
+        value: u64,
+    },
+
     /// Text without the columns that say where points are.
     #[error(
         "no line of this text names columns of longitude and latitude, or of x, y and z; add a line such as 'lon,lat,value' before the numbers"
@@ -485,6 +694,108 @@ pub enum Error {
     Steps {
         /// The number of times.
         steps: usize,
+    },
+
+    /// A coordinate without values.
+    #[error("the {coordinate} has no values; check the file")]
+    NoCoordinates {
+        /// Which coordinate: latitude or longitude.
+        coordinate: &'static str,
+    },
+    /// A coordinate that turns back, or stands still.
+    #[error(
+        "the {coordinate} {value} at index {index} follows {before} against the order of the other values; sort the field along it"
+    )]
+    NotMonotonic {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value before.
+        before: f64,
+        /// The value.
+        value: f64,
+    },
+    /// A coordinate, or a bound of a cell, that is not on the sphere.
+    #[error("the {coordinate} {value} at index {index} is not between {least} and {most} degrees; {remedy}")]
+    CoordinateRange {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// The least it could be.
+        least: f64,
+        /// The most it could be.
+        most: f64,
+        /// What it looks like, and what to do.
+        remedy: &'static str,
+    },
+    /// Coordinates in radians.
+    #[error("the longitudes go once around in 2π, so they look like radians; convert the coordinates to degrees")]
+    Radians,
+    /// Longitudes that go around the sphere more than once.
+    #[error("the longitudes span {span} degrees, more than the circle has; remove the columns that repeat others")]
+    LongitudeSpan {
+        /// From the first to the last.
+        span: f64,
+    },
+    /// A single value, from which no size of a cell follows.
+    #[error(
+        "the {coordinate} has the single value {value} and no bounds, so the extent of its cells is unknown; add bounds"
+    )]
+    NoSpacing {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// Bounds of cells that do not match the coordinate.
+    #[error(
+        "the {coordinate} has {points} values but {bounds} bounds, which are neither edges ({points} + 1) nor pairs (2 x {points}); correct the bounds"
+    )]
+    BoundsCount {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of values.
+        points: usize,
+        /// The number of bounds.
+        bounds: usize,
+    },
+    /// A cell that its own point is not in.
+    #[error("the {coordinate} {value} at index {index} is not within its bounds {low} and {high}; correct the bounds")]
+    BoundsApart {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// One bound.
+        low: f64,
+        /// The other.
+        high: f64,
+    },
+    /// Cells that share an area.
+    #[error("the bounds of the {coordinate} at the indices {first} and {second} overlap; correct the bounds")]
+    BoundsOverlap {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of one value, from 0.
+        first: usize,
+        /// The number of the other.
+        second: usize,
+    },
+    /// A grid beyond what weights can name.
+    #[error(
+        "a grid of {latitudes} latitudes and {longitudes} longitudes has more than 2^32 cells; select a part of it"
+    )]
+    GridSize {
+        /// The number of latitudes.
+        latitudes: usize,
+        /// The number of longitudes.
+        longitudes: usize,
     },
 
     /// A file that is not to be replaced.

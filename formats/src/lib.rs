@@ -5,6 +5,7 @@
 //! puts a finished file in its place. What is done with a map is left to others.
 
 mod adapter;
+mod cf;
 mod cfitsio;
 mod columns;
 mod csv;
@@ -13,18 +14,24 @@ mod directions;
 mod error;
 mod healpix;
 mod healpix_fits;
+mod interpret;
+mod latlon;
+mod libnetcdf;
 mod map;
+mod netcdf;
 mod ply;
 mod points;
+mod regrid;
 mod save;
 mod surface;
 
 pub use adapter::{
-    Adapter, At, Description, Field, FieldDescription, Gather, Indexing, Maps, Method, Place, Regrid, Selection,
-    TableDescription, describe, open, read,
+    Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
+    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, open, read,
 };
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use regrid::{LatLon, Weights};
 pub use save::{check_writable, save};

@@ -61,14 +61,15 @@ impl Adapter for SurfacePly {
 
     fn describe(&self, path: &Path) -> Result<Description, Error> {
         let mut input = BufReader::new(File::open(path).map_err(Error::io("open it"))?);
-        Header::parse(&mut input)?.columns()?;
-        Ok(Description { format: self.name(), tables: Vec::new() })
+        let header = Header::parse(&mut input)?;
+        let columns = header.columns()?;
+        // A surface is the same whatever values it has.
+        let surface = header.surface(input, "x")?;
+        Ok(columns::describe(self.name(), surface.describe()?, &columns))
     }
 
     fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
-        if let Some(at) = selection.at.first() {
-            return Err(Error::NoDimension { dimension: shown(&at.dimension) });
-        }
+        columns::check(selection)?;
         let mut input = BufReader::new(File::open(path).map_err(Error::io("open it"))?);
         let header = Header::parse(&mut input)?;
         let mut columns = header.columns()?;
@@ -95,6 +96,10 @@ impl Maps for One {
         let mut map = self.surface.map(self.nside, &self.regrid)?;
         map.name = self.name.clone();
         Ok(map)
+    }
+
+    fn values(&mut self, _: usize) -> Result<Vec<f64>, Error> {
+        Ok(self.surface.values.clone())
     }
 }
 

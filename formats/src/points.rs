@@ -8,7 +8,7 @@ use std::f64::consts::{LN_2, PI};
 use rstar::PointDistance;
 
 use crate::directions::{Direction, angle, chart, chord, closest_nside, nearest, pixel_at, places, spacing, tree};
-use crate::{Error, Gather, Healpix, Map, Regrid};
+use crate::{CoordinateSystem, Error, Gather, GridDescription, Healpix, Map, Regrid};
 
 /// A Gaussian is cut at this many standard deviations, where its weight is 1.5e-8, below the rounding of
 /// single-precision values.
@@ -26,14 +26,23 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
-    /// The Nside whose pixels are closest to the typical distance between points, see [`crate::directions::spacing`].
-    pub(crate) fn nside(&self) -> Result<usize, Error> {
-        spacing(&places(self.directions.iter().copied())).map(closest_nside).ok_or(Error::OnePlace)
+    /// What the points are, for people.
+    pub(crate) fn describe(&self, coordinates: Option<CoordinateSystem>) -> Result<GridDescription, Error> {
+        let spacing = spacing(&places(self.directions.iter().copied()));
+        let nside = spacing.map(closest_nside);
+        let covered = match nside {
+            Some(_) => {
+                Some(self.gather(nside, &Regrid { gather: Gather::Nearest, ..Regrid::default() })?.share_valid())
+            }
+            None => None,
+        };
+        let points = self.values.len();
+        Ok(GridDescription::Points { points, coordinates, spacing: spacing.map(f64::to_degrees), nside, covered })
     }
 
     /// Makes a map of the samples, of which there is at least one.
     ///
-    /// The Nside is that of [`Samples::nside`] unless given. Coincident samples count each, except that the nearest one
+    /// The Nside is that of the pixels closest to the typical distance between points unless given. Coincident samples count each, except that the nearest one
     /// is the first of them. A pixel whose centre no Gaussian reaches has the value of the nearest sample, to which the
     /// weighted mean tends far from all samples.
     ///

@@ -14,7 +14,7 @@ use rstar::{AABB, RTree};
 
 use crate::directions::{self, Direction, chart, closest_nside, dot, from_centre, mean, places, spacing};
 use crate::error::Percent;
-use crate::{Error, Healpix, Map, Regrid};
+use crate::{Error, GridDescription, Healpix, Map, Regrid};
 
 /// Boxes are wider than their triangles by this, which is above what rounding can move a direction.
 const MARGIN: f64 = 1e-12;
@@ -32,31 +32,63 @@ pub(crate) struct Surface {
 
 /// The vertices of a surface as they are seen from a centre.
 struct View {
+    /// The centre.
+    centre: [f64; 3],
     /// Directions to the vertices.
     directions: Vec<Direction>,
     /// Distances to the vertices.
     distances: Vec<f64>,
+    /// Whether each vertex is in a triangle. The others play no part.
+    used: Vec<bool>,
 }
 
 /// A triangle's number with a box around all directions in which it is seen.
 type Boxed = GeomWithData<Rectangle<Direction>, usize>;
 
 impl Surface {
-    /// Whether each vertex is in a triangle. The others play no part.
-    fn used(&self) -> Vec<bool> {
-        let mut used = vec![false; self.vertices.len()];
-        self.triangles.iter().flatten().for_each(|&vertex| used[vertex] = true);
-        used
+    /// What the surface is, for people.
+    pub(crate) fn describe(&self) -> Result<GridDescription, Error> {
+        let view = self.view(None)?;
+        let grid = view.grid(None)?;
+        let seen = self.seen(&view, grid)?;
+        let share = |pixels: usize| pixels as f64 / grid.pixels() as f64;
+        Ok(GridDescription::Surface {
+            vertices: self.vertices.len(),
+            triangles: self.triangles.len(),
+            centre: view.centre,
+            nside: grid.nside(),
+            covered: 1.0 - share(seen.never),
+            folded: share(seen.several),
+        })
+    }
+
+    /// Makes a map of the values, which are linear within each triangle. A pixel in a triangle that has a vertex without
+    /// a value is masked.
+    ///
+    /// The Nside is that of the pixels closest to the typical distance between vertices unless given, the centre the
+    /// mean of the vertices. Vertices in no triangle play no part.
+    ///
+    /// # Errors
+    /// [`Error::Crossings`] unless each pixel's ray crosses the surface once, or folds are allowed.
+    pub(crate) fn map(&self, nside: Option<usize>, regrid: &Regrid) -> Result<Map, Error> {
+        let view = self.view(regrid.centre)?;
+        let grid = view.grid(nside)?;
+        let Seen { map, never, several } = self.seen(&view, grid)?;
+        if regrid.allow_folds || never + several == 0 {
+            return Ok(map);
+        }
+        let percent = |pixels| Percent { pixels, of: grid.pixels() };
+        Err(Error::Crossings { never: percent(never), several: percent(several) })
     }
 
     /// The view from a centre, the mean of the vertices unless given.
     fn view(&self, centre: Option<[f64; 3]>) -> Result<View, Error> {
-        let used = self.used();
-        let corners: Vec<[f64; 3]> =
-            self.vertices.iter().zip(&used).filter(|(_, used)| **used).map(|(v, _)| *v).collect();
+        let mut used = vec![false; self.vertices.len()];
+        self.triangles.iter().flatten().for_each(|&vertex| used[vertex] = true);
+        let corners: Vec<_> = self.vertices.iter().zip(&used).filter(|(_, used)| **used).map(|(v, _)| *v).collect();
         let centre = directions::centre(centre, corners.into_iter())?;
-        let mut view = View { directions: Vec::new(), distances: Vec::new() };
-        for (i, (&vertex, used)) in self.vertices.iter().zip(used).enumerate() {
+        let mut view = View { centre, directions: Vec::new(), distances: Vec::new(), used };
+        for (i, (&vertex, &used)) in self.vertices.iter().zip(&view.used).enumerate() {
             let (direction, distance) = match from_centre(vertex, centre) {
                 Some(seen) => seen,
                 None if used => return Err(Error::AtCentre { place: format!("vertex {i} (from 0)") }),
@@ -68,26 +100,8 @@ impl Surface {
         Ok(view)
     }
 
-    /// The Nside whose pixels are closest to the typical distance between vertices, see [`crate::directions::spacing`].
-    pub(crate) fn nside(&self, centre: Option<[f64; 3]>) -> Result<usize, Error> {
-        self.nside_of(&self.view(centre)?)
-    }
-
-    fn nside_of(&self, view: &View) -> Result<usize, Error> {
-        let used = view.directions.iter().zip(self.used()).filter(|(_, used)| *used).map(|(d, _)| *d);
-        spacing(&places(used)).map(closest_nside).ok_or(Error::OnePlace)
-    }
-
-    /// Makes a map of the values, which are linear within each triangle. A pixel in a triangle that has a vertex without
-    /// a value is masked.
-    ///
-    /// The Nside is that of [`Surface::nside`] unless given, the centre the mean of the vertices.
-    ///
-    /// # Errors
-    /// [`Error::Crossings`] unless each pixel's ray crosses the surface once, or folds are allowed.
-    pub(crate) fn map(&self, nside: Option<usize>, regrid: &Regrid) -> Result<Map, Error> {
-        let view = self.view(regrid.centre)?;
-        let grid = Healpix::new(nside.map_or_else(|| self.nside_of(&view), Ok)?)?;
+    /// The outermost layer at each pixel.
+    fn seen(&self, view: &View, grid: Healpix) -> Result<Seen, Error> {
         let boxed = |(i, triangle): (usize, &[usize; 3])| Boxed::new(view.rectangle(*triangle), i);
         let tree = RTree::bulk_load(self.triangles.iter().enumerate().map(boxed).collect());
         let (never, several) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -112,16 +126,28 @@ impl Surface {
             };
             outermost.2
         })?;
-        let (never, several) = (never.into_inner(), several.into_inner());
-        if regrid.allow_folds || never + several == 0 {
-            return Ok(map);
-        }
-        let percent = |pixels| Percent { pixels, of: grid.pixels() };
-        Err(Error::Crossings { never: percent(never), several: percent(several) })
+        Ok(Seen { map, never: never.into_inner(), several: several.into_inner() })
     }
 }
 
+/// A surface at the pixels of a grid.
+struct Seen {
+    /// The values of its outermost layer.
+    map: Map,
+    /// Number of pixels without a layer.
+    never: usize,
+    /// Number of pixels with more than one layer.
+    several: usize,
+}
+
 impl View {
+    /// The grid of an Nside, or of the pixels closest to the typical distance between vertices.
+    fn grid(&self, nside: Option<usize>) -> Result<Healpix, Error> {
+        let used = self.directions.iter().zip(&self.used).filter(|(_, used)| **used).map(|(d, _)| *d);
+        let closest = || spacing(&places(used)).map(closest_nside).ok_or(Error::OnePlace);
+        Healpix::new(nside.map_or_else(closest, Ok)?)
+    }
+
     /// Where a ray crosses a triangle: the inverse of the distance, and the weights of the vertices, whose sum it is.
     fn crossing(&self, vertices: [usize; 3], ray: Direction) -> Option<(f64, [f64; 3])> {
         let [a, b, c] = vertices.map(|vertex| self.directions[vertex]);
