@@ -92,10 +92,11 @@ pub struct Regrid {
     pub min_valid: f64,
     /// From points.
     pub gather: Gather,
-    /// Pixels farther than this from any point, in degrees, are masked; unless given, twice the typical distance between
-    /// points.
+    /// Pixels whose centre is farther than this from any point, in degrees, are masked; unless given, twice the typical
+    /// distance between points, which is the median distance to the fourth nearest neighbour (coincident points count
+    /// once).
     pub reach: Option<f64>,
-    /// The point from which a surface is seen; the mean of its vertices unless given.
+    /// The point from which a surface, or points in space, are seen; the mean of its vertices, or of them, unless given.
     pub centre: Option<[f64; 3]>,
     /// Whether, where a ray from the centre crosses a surface more than once, the outermost crossing counts.
     pub allow_folds: bool,

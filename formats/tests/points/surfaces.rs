@@ -1,5 +1,7 @@
 //! Surfaces in PLY: every layout gives the same map, and the map is that of plain geometry over all triangles.
 
+use longan_formats::GridDescription;
+
 use crate::*;
 
 /// A surface with values.
@@ -491,4 +493,31 @@ fn points_in_a_table_and_vertices_lie_at_the_same_places() {
         assert_eq!(fine_table.values()[pixel], *value);
         assert!((fine_mesh.values()[pixel] - value).abs() < 0.02);
     }
+}
+
+#[test]
+fn descriptions_say_what_there_is() {
+    let whole = sphere(4).moved(turned).moved(|[x, y, z]| [x + 2.0, y, z]);
+    let layout = Layout { extra: true, ..Layout::default() };
+    let described = |mesh: &Mesh| {
+        let description = longan_formats::describe(&scratch(&layout.write(mesh)).path).unwrap();
+        assert_eq!(description.tables[0].fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>(), ["value"]);
+        description.tables[0].grid.clone()
+    };
+    let GridDescription::Surface { vertices, triangles, centre, nside, covered, folded } = described(&whole) else {
+        panic!()
+    };
+    assert_eq!((vertices, triangles, nside, covered, folded), (1026, 2048, 8, 1.0, 0.0));
+    assert!((centre[0] - 2.0).abs() < 1e-9 && centre[1].abs() < 1e-9);
+    let GridDescription::Surface { covered, folded, .. } = described(&half().and(half())) else { panic!() };
+    assert!((covered - folded).abs() < 1e-12, "{covered} {folded}");
+    // Half a sphere is seen from its own middle, half way to its top: the rim is 120° from there.
+    assert!((0.7..0.8).contains(&covered), "{covered}");
+}
+
+#[test]
+fn values_are_those_of_the_file() {
+    let mesh = sphere(1);
+    let mut maps = longan_formats::open(&scratch(&mesh.ply()).path, &Selection::default()).unwrap();
+    assert_eq!(maps.values(0).unwrap(), mesh.values);
 }

@@ -1,5 +1,7 @@
 //! Tables in every dialect give the same map.
 
+use longan_formats::GridDescription;
+
 use crate::*;
 
 /// Longitude, latitude and value as text.
@@ -219,4 +221,41 @@ fn positions_in_space() {
 fn height_is_a_value_where_there_are_angles() {
     let text = "lon,lat,z\n0,0,1\n90,0,2\n0,90,3\n";
     assert_eq!(read_with(text.as_bytes(), &Selection::default()).unwrap().name, "z");
+}
+
+#[test]
+fn descriptions_say_what_there_is() {
+    let points: Vec<[f64; 3]> = fibonacci(12 * 32 * 32).into_iter().filter(|d| d[0] > 0.0).collect();
+    let rows = points.iter().map(|&p| {
+        let (lon, lat) = degrees(p);
+        format!("{lon};;{lat};st, a;1\n")
+    });
+    let text = "ra;depth [mm];dec;name;flux\n".to_owned() + &rows.collect::<String>() + "10;2.5;20;;\n;;;;\n";
+    let description = longan_formats::describe(&scratch(text.as_bytes()).path).unwrap();
+    let [table] = &description.tables[..] else { panic!() };
+    let fields: Vec<_> = table.fields.iter().map(|f| (f.name.as_str(), f.unit.as_deref())).collect();
+    assert_eq!(fields, [("depth", Some("mm")), ("flux", None)]);
+    let GridDescription::Points { points: count, coordinates, spacing, nside, covered } = table.grid else { panic!() };
+    assert_eq!(count, points.len() + 1);
+    assert_eq!((coordinates, nside), (Some(longan_formats::CoordinateSystem::Celestial), Some(32)));
+    assert!((spacing.unwrap() - 1.83).abs() < 0.2, "{spacing:?}");
+    assert!((0.5..0.54).contains(&covered.unwrap()), "{covered:?}");
+    // One place has no distances.
+    let description = longan_formats::describe(&scratch(b"lon,lat,v\n1,2,3\n").path).unwrap();
+    let GridDescription::Points { points: 1, spacing: None, nside: None, covered: None, .. } =
+        description.tables[0].grid
+    else {
+        panic!("{description:?}")
+    };
+    let json = serde_json::to_value(&description).unwrap();
+    assert_eq!(json["tables"][0]["points"], 1);
+    assert_eq!(json["tables"][0]["fields"][0]["name"], "v");
+}
+
+#[test]
+fn values_are_those_of_the_file() {
+    let file = scratch(b"lon,lat,v\n1,2,3\n4,5,\n7,8,-9\n");
+    let mut maps = longan_formats::open(&file.path, &Selection::default()).unwrap();
+    assert_eq!(maps.values(0).unwrap(), [3.0, -9.0]);
+    assert!(maps.times().is_empty());
 }
