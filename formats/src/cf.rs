@@ -9,6 +9,6 @@ mod select;
 mod time;
 mod unpack;
 
-pub(crate) use coordinates::{Horizontal, find, names_in};
+pub(crate) use coordinates::{Horizontal, find, is_position, names_in};
 pub(crate) use select::{Chosen, Labels, select, shape};
 pub(crate) use unpack::values;

@@ -64,20 +64,19 @@ impl Adapter for PointsCsv {
 
     fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
         columns::check(selection)?;
-        let mut table = Table::open(path)?;
+        let table = Table::open(path)?;
         let values = columns::choose(&table.header.columns, selection.field.as_ref())?;
         let samples = table.samples(values, selection.regrid.centre)?;
-        let column = table.header.columns.swap_remove(values);
-        let system = table.header.system;
-        Ok(Box::new(One { samples, column, system, nside: selection.nside, regrid: selection.regrid.clone() }))
+        Ok(Box::new(One { table, values, samples, nside: selection.nside, regrid: selection.regrid.clone() }))
     }
 }
 
 /// The one map of a table of points.
 struct One {
+    table: Table,
+    /// The column of values.
+    values: usize,
     samples: Samples,
-    column: Column,
-    system: Option<CoordinateSystem>,
     nside: Option<usize>,
     regrid: Regrid,
 }
@@ -89,14 +88,15 @@ impl Maps for One {
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
         let mut map = self.samples.gather(self.nside, &self.regrid)?;
-        map.name = self.column.name.clone();
-        map.unit = self.column.unit.clone();
-        map.coordinates = self.system;
+        let Header { columns, system, .. } = &self.table.header;
+        map.name = columns[self.values].name.clone();
+        map.unit = columns[self.values].unit.clone();
+        map.coordinates = *system;
         Ok(map)
     }
 
     fn values(&mut self, _: usize) -> Result<Vec<f64>, Error> {
-        Ok(self.samples.values.clone())
+        Ok(self.table.points(self.values)?.into_iter().map(|(_, value, _)| value).collect())
     }
 }
 
@@ -308,8 +308,8 @@ impl Table {
         }
     }
 
-    /// The points that have a value in a column.
-    fn samples(&self, values: usize, centre: Option<[f64; 3]>) -> Result<Samples, Error> {
+    /// The points, their values in a column (NaN where there is none), and where their rows begin.
+    fn points(&self, values: usize) -> Result<Vec<([f64; 3], f64, u64)>, Error> {
         let mut rows = self.rows()?;
         let mut row = csv::ByteRecord::new();
         let mut points = Vec::new();
@@ -319,6 +319,12 @@ impl Table {
                 points.push((point, value, at));
             }
         }
+        Ok(points)
+    }
+
+    /// The points that have a value in a column.
+    fn samples(&self, values: usize, centre: Option<[f64; 3]>) -> Result<Samples, Error> {
+        let mut points = self.points(values)?;
         // Points without a value count for the centre, which so is the same for all columns.
         let centre = match self.header.position {
             Position::Angles { .. } => [0.0; 3],

@@ -77,7 +77,7 @@ pub enum Error {
 
     /// Not a file that any adapter reads.
     #[error(
-        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, points in CSV files with columns such as lon, lat, and surfaces in PLY files; convert it first"
+        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, fields in NetCDF files, points in CSV files with columns such as lon, lat, and surfaces in PLY files; convert it first"
     )]
     NotRecognised {
         /// What the content looks like.
@@ -343,6 +343,9 @@ pub enum Error {
         /// libnetcdf's words for what is wrong.
         message: String,
     },
+    /// A NetCDF 3 header that makes no sense.
+    #[error("the NetCDF header is damaged or cut short; fetch the file again")]
+    NetcdfHeader,
     /// A NetCDF file with less data than its header promises.
     #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
     NetcdfTruncated {

@@ -138,7 +138,8 @@ fn candidates(dataset: &dyn Dataset) -> Result<Vec<OnGrid>, Error> {
     let mut problem = None;
     for (place, variable) in variables.iter().enumerate() {
         let numbers = !matches!(variable.kind, Kind::Text | Kind::Other);
-        if !numbers || variable.dimensions.len() < 2 || serving.contains(&variable.path()) {
+        let serves = serving.contains(&variable.path()) || cf::is_position(variable);
+        if !numbers || serves || variable.dimensions.len() < 2 {
             continue;
         }
         match Horizontal::of(dataset, variable) {

@@ -3,7 +3,7 @@
 //! All `unsafe` for NetCDF is here. What names and attributes mean is left to others.
 //!
 //! libnetcdf takes some names for addresses on the net (`http://...`, `file#mode=zarr`), so it is given nothing but
-//! absolute paths. It is not thread-safe: each call takes the lock that it shares with HDF5.
+//! absolute paths; and backslashes for slashes, so a path with one is reached by a link. It is not thread-safe: each call takes the lock that it shares with HDF5.
 
 use std::ffi::{CStr, CString, c_char, c_int};
 use std::fmt::Display;
@@ -96,7 +96,17 @@ impl Drop for NetcdfReader {
 impl NetcdfReader {
     /// Opens a file.
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
-        let path = path.canonicalize().map_err(Error::io("open it"))?;
+        let mut path = path.canonicalize().map_err(Error::io("open it"))?;
+        // Once the file is open, the link is not needed.
+        let _folder;
+        #[cfg(unix)]
+        if path.as_os_str().as_encoded_bytes().contains(&b'\\') {
+            let folder = tempfile::tempdir().map_err(Error::io("make a link to it"))?;
+            let link = folder.path().join("link.nc");
+            std::os::unix::fs::symlink(&path, &link).map_err(Error::io("make a link to it"))?;
+            path = link;
+            _folder = folder;
+        }
         let path = CString::new(path.into_os_string().into_encoded_bytes());
         let path = path.map_err(|e| Error::Io { action: "open it", cause: e.into() })?;
         let mut id = 0;

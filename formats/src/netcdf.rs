@@ -61,7 +61,7 @@ impl NetcdfFile {
     /// # Errors
     /// Where it cannot be read or is cut short.
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
-        classic::check_size(path)?;
+        classic::check(path)?;
         let reader = NetcdfReader::open(path)?;
         let (mut groups, mut variables, mut heads) = (Vec::new(), Vec::new(), Vec::new());
         for (id, group) in reader.groups()? {

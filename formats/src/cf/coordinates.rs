@@ -89,6 +89,12 @@ impl Axis {
     }
 }
 
+/// Whether a variable surely holds latitudes or longitudes.
+pub(crate) fn is_position(variable: &Variable) -> bool {
+    let evidence = |axis: Axis| axis.evidence(variable).is_some_and(|evidence| evidence <= Evidence::StandardName);
+    evidence(Axis::Latitude) || evidence(Axis::Longitude)
+}
+
 /// The dimensions of a variable that run over the sphere, and their coordinates.
 #[derive(Debug)]
 pub(crate) struct Horizontal {

@@ -335,6 +335,47 @@ mod tests {
         assert_eq!(date(1.0, "days since 2000-02-28", "365_day"), "2000-03-01");
     }
 
+    /// Dates that cftime (python) has for numbers, one for each calendar and reference.
+    #[test]
+    fn dates_of_cftime() {
+        let dates: [(&str, &str, f64, &str); 30] = [
+            ("standard", "days since 1800-01-01 00:00:00", -59109.0, "1638-03-02T00:00:00"),
+            ("standard", "hours since 0001-01-01 00:00:00", 483672.0, "0056-03-06T00:00:00"),
+            ("standard", "seconds since 1970-01-01 12:00:00", 6848668800.0, "2187-01-10T12:00:00"),
+            ("standard", "minutes since 2100-02-28 23:59:00", 287598240.0, "2646-12-24T23:59:00"),
+            ("standard", "days since 1582-10-04", 379715.0, "2622-05-30T00:00:00"),
+            ("proleptic_gregorian", "days since 1800-01-01 00:00:00", 236396.0, "2447-03-26T00:00:00"),
+            ("proleptic_gregorian", "hours since 0001-01-01 00:00:00", 7977120.0, "0911-01-11T00:00:00"),
+            ("proleptic_gregorian", "seconds since 1970-01-01 12:00:00", 4711500000.0, "2119-04-21T18:00:00"),
+            ("proleptic_gregorian", "minutes since 2100-02-28 23:59:00", 479697120.0, "3012-03-22T23:59:00"),
+            ("proleptic_gregorian", "days since 1582-10-04", -154401.0, "1160-01-09T00:00:00"),
+            ("julian", "days since 1800-01-01 00:00:00", 365829.0, "2801-08-02T00:00:00"),
+            ("julian", "hours since 0001-01-01 00:00:00", 4855848.0, "0554-12-11T00:00:00"),
+            ("julian", "seconds since 1970-01-01 12:00:00", 34360156800.0, "3058-10-23T12:00:00"),
+            ("julian", "minutes since 2100-02-28 23:59:00", -285607440.0, "1557-02-20T11:59:00"),
+            ("julian", "days since 1582-10-04", -103949.0, "1298-02-28T00:00:00"),
+            ("noleap", "days since 1800-01-01 00:00:00", 94856.0, "2059-11-18T00:00:00"),
+            ("noleap", "hours since 0001-01-01 00:00:00", 1622712.0, "0186-03-30T00:00:00"),
+            ("noleap", "seconds since 1970-01-01 12:00:00", 27700812000.0, "2848-05-22T18:00:00"),
+            ("noleap", "minutes since 2100-02-28 23:59:00", -4070160.0, "2092-06-02T11:59:00"),
+            ("noleap", "days since 1582-10-04", 36321.0, "1682-04-08T00:00:00"),
+            ("all_leap", "days since 1800-01-01 00:00:00", 371161.0, "2814-02-07T00:00:00"),
+            ("all_leap", "hours since 0001-01-01 00:00:00", 5928168.0, "0675-11-19T00:00:00"),
+            ("all_leap", "seconds since 1970-01-01 12:00:00", -10354219200.0, "1642-07-27T00:00:00"),
+            ("all_leap", "minutes since 2100-02-28 23:59:00", 558653760.0, "3160-02-22T23:59:00"),
+            ("all_leap", "days since 1582-10-04", 163783.0, "2030-04-02T00:00:00"),
+            ("360_day", "days since 1800-01-01 00:00:00", 110454.0, "2106-10-25T00:00:00"),
+            ("360_day", "hours since 0001-01-01 00:00:00", 254628.0, "0030-06-20T12:00:00"),
+            ("360_day", "seconds since 1970-01-01 12:00:00", -8545975200.0, "1695-03-29T18:00:00"),
+            ("360_day", "minutes since 2100-02-28 23:59:00", -189367200.0, "1734-11-13T23:59:00"),
+            ("360_day", "days since 1582-10-04", 81028.0, "1807-11-02T00:00:00"),
+        ];
+        for (calendar, units, value, expected) in dates {
+            let units = TimeUnits::parse(units, calendar).unwrap();
+            assert_eq!(format!("{:#}", units.moment(value).unwrap()), expected, "{value} {calendar}");
+        }
+    }
+
     #[test]
     fn units_as_they_are_met() {
         for units in [

@@ -1,7 +1,8 @@
-//! How long a NetCDF 3 file should be.
+//! Whether a NetCDF 3 file is whole.
 //!
-//! libnetcdf reads zeros beyond the end of such a file. So its header is looked at here, as the NetCDF file format
-//! specification has it (appendix B of the NetCDF User's Guide): for where the data end, and for nothing else.
+//! libnetcdf reads zeros beyond the end of such a file, and may crash on a damaged header. So the header is looked at
+//! here first, as the NetCDF file format specification has it (appendix B of the NetCDF User's Guide): for whether it
+//! makes sense and where the data end. What it says is left to libnetcdf.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -22,15 +23,20 @@ pub(super) fn recognises(head: &[u8]) -> bool {
     [b"CDF\x01", b"CDF\x02", b"CDF\x05"].iter().any(|magic| head.starts_with(*magic))
 }
 
-/// Fails where a NetCDF 3 file ends before its data. Other files pass, and damaged headers, of which libnetcdf
-/// complains.
-pub(super) fn check_size(path: &Path) -> Result<(), Error> {
-    let file = File::open(path).map_err(Error::io("open it"))?;
-    let found = file.metadata().map_err(Error::io("open it"))?.len();
-    match Header::new(BufReader::new(file)).and_then(|mut header| header.end_of_data()) {
-        Ok(needed) if needed > u128::from(found) => Err(Error::NetcdfTruncated { needed, found }),
-        _ => Ok(()),
+/// Fails where a NetCDF 3 file has a damaged header or ends before its data. Other files pass.
+pub(super) fn check(path: &Path) -> Result<(), Error> {
+    let mut file = BufReader::new(File::open(path).map_err(Error::io("open it"))?);
+    let found = file.get_ref().metadata().map_err(Error::io("open it"))?.len();
+    let mut magic = Vec::new();
+    file.by_ref().take(4).read_to_end(&mut magic).map_err(Error::io("read it"))?;
+    if !recognises(&magic) {
+        return Ok(());
     }
+    let needed = Header { from: file, version: magic[3] }.end_of_data().map_err(|cause| match cause.kind() {
+        io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => Error::NetcdfHeader,
+        _ => Error::Io { action: "read it", cause },
+    })?;
+    if needed > u128::from(found) { Err(Error::NetcdfTruncated { needed, found }) } else { Ok(()) }
 }
 
 /// A header that is being read.
@@ -45,12 +51,6 @@ fn damaged() -> io::Error {
 }
 
 impl<R: Read> Header<R> {
-    fn new(mut from: R) -> io::Result<Self> {
-        let mut magic = [0; 4];
-        from.read_exact(&mut magic)?;
-        if recognises(&magic) { Ok(Header { from, version: magic[3] }) } else { Err(damaged()) }
-    }
-
     fn u32(&mut self) -> io::Result<u32> {
         let mut bytes = [0; 4];
         self.from.read_exact(&mut bytes)?;

@@ -90,7 +90,8 @@ fn what_is_written_is_read() {
         }
         let description = describe(&path).unwrap();
         assert_eq!(description.tables.len(), 2);
-        assert_eq!(description.tables[1].name.as_deref(), Some("TWO"));
+        let second = TablePlace::Hdu { hdu: 2, name: Some("TWO".into()) };
+        assert_eq!(description.tables[1].place, second);
         assert_eq!(fs::read(&path).unwrap().starts_with(&[0x1f, 0x8b]), name.ends_with(".gz"));
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), files().len());

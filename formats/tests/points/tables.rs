@@ -256,6 +256,7 @@ fn descriptions_say_what_there_is() {
 fn values_are_those_of_the_file() {
     let file = scratch(b"lon,lat,v\n1,2,3\n4,5,\n7,8,-9\n");
     let mut maps = longan_formats::open(&file.path, &Selection::default()).unwrap();
-    assert_eq!(maps.values(0).unwrap(), [3.0, -9.0]);
+    let values = maps.values(0).unwrap();
+    assert!(values.len() == 3 && values[0] == 3.0 && values[1].is_nan() && values[2] == -9.0, "{values:?}");
     assert!(maps.times().is_empty());
 }
