@@ -33,7 +33,7 @@ fn points_and_triangles_agree() {
     for (way, least, apart) in
         [(Gather::Mean, 0.99, 0.05), (Gather::Nearest, 0.99, 0.05), (Gather::Gaussian { fwhm: 2.0 }, 0.9995, 0.02)]
     {
-        for nside in [None, Some(32), Some(64), Some(128)] {
+        for nside in [None, Some(64), Some(128)] {
             let (points, triangles) = both(&folder, nside, gather(way));
             assert_eq!(points.grid(), triangles.grid());
             assert_eq!(points.grid().nside(), nside.unwrap_or(32));
@@ -62,7 +62,7 @@ fn both_are_the_same_at_the_vertices() {
     let Some(folder) = std::env::var_os("LONGAN_SHARED").map(PathBuf::from) else {
         return skipped("both_are_the_same_at_the_vertices", "LONGAN_SHARED does not name the folder of shared data");
     };
-    let (points, triangles) = both(&folder, Some(1024), gather(Gather::Nearest));
+    let (points, triangles) = both(&folder, Some(512), gather(Gather::Nearest));
     let table = std::fs::read_to_string(folder.join("data/cortex_fsaverage5_left.csv")).unwrap();
     let mut differences = Vec::new();
     for row in table.lines().skip(1) {
@@ -74,9 +74,9 @@ fn both_are_the_same_at_the_vertices() {
         differences.push((triangles.values()[pixel] - value).abs());
     }
     assert_eq!(differences.len(), 10242);
-    // A pixel's centre is up to 0.04° from the vertex, a fiftieth of an edge, over which the depth changes by less than
+    // A pixel's centre is up to 0.08° from the vertex, a twenty-fifth of an edge, over which the depth changes by less than
     // its whole range (4).
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
     let largest = differences.iter().copied().fold(0.0, f64::max);
-    assert!(mean < 0.01 && largest < 0.08, "{mean} {largest}");
+    assert!(mean < 0.02 && largest < 0.16, "{mean} {largest}");
 }
