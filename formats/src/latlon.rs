@@ -191,7 +191,7 @@ fn choose(dataset: &dyn Dataset, field: Option<&Field>) -> Result<OnGrid, Error>
 /// Variables with their units and dimensions.
 fn listed<'v>(variables: impl Iterator<Item = &'v Variable> + Clone) -> String {
     let one = |variable: &Variable| {
-        let unit = variable.text("units").map(|unit| format!(" in {unit}")).unwrap_or_default();
+        let unit = variable.text("units").map(|unit| format!(" in {}", unit.escape_debug())).unwrap_or_default();
         format!("'{}'{unit} with dimensions {}", variable.path(), cf::shape(variable))
     };
     let mut names: Vec<_> = variables.clone().take(LISTED).map(one).collect();

@@ -72,9 +72,9 @@ fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).unwrap_or_else(|e| e.into_bytes().into_iter().map(char::from).collect())
 }
 
-/// The name in a buffer that libnetcdf has filled.
+/// The name in a buffer that libnetcdf has filled, on one line.
 fn name(buffer: &[u8; NAME_LEN]) -> String {
-    text(buffer.iter().copied().take_while(|&b| b != 0).collect())
+    text(buffer.iter().copied().take_while(|&b| b != 0).collect()).replace(char::is_control, "\u{fffd}")
 }
 
 /// A vector of `len` zeros, unless there is not the memory for it.

@@ -117,10 +117,10 @@ impl Horizontal {
         let latitude = axis_of(dataset, variable, Axis::Latitude);
         let longitude = axis_of(dataset, variable, Axis::Longitude);
         let sure = |axis: &Option<Found>| axis.as_ref().is_some_and(|found| found.evidence <= Evidence::StandardName);
-        if !(sure(&latitude) && sure(&longitude)) {
-            if let Some(coordinate) = two_dimensional(dataset, variable) {
-                return Err(Error::Curvilinear { variable: variable.path(), coordinate: coordinate.path() });
-            }
+        if !(sure(&latitude) && sure(&longitude))
+            && let Some(coordinate) = two_dimensional(dataset, variable)
+        {
+            return Err(Error::Curvilinear { variable: variable.path(), coordinate: coordinate.path() });
         }
         let (Some(latitude), Some(longitude)) = (latitude, longitude) else { return Ok(None) };
         let both = [latitude.variable, longitude.variable].map(|place| &dataset.variables()[place]);
@@ -189,14 +189,14 @@ fn two_dimensional<'d>(dataset: &'d dyn Dataset, variable: &Variable) -> Option<
 fn check_degrees(coordinate: &Variable) -> Result<(), Error> {
     let standard_name = coordinate.text("standard_name");
     if let Some(found) = standard_name.filter(|name| !["latitude", "longitude"].contains(name)) {
-        return Err(Error::OtherAxis { coordinate: coordinate.path(), found: found.to_owned() });
+        return Err(Error::OtherAxis { coordinate: coordinate.path(), found: found.escape_debug().to_string() });
     }
     let Some(units) = coordinate.text("units").map(str::trim) else { return Ok(()) };
     let plain = ["degrees", "degree", "deg", "\u{b0}", ""].iter().any(|u| u.eq_ignore_ascii_case(units));
     if plain || Axis::Latitude.has_units(units) || Axis::Longitude.has_units(units) {
         return Ok(());
     }
-    let (coordinate, units) = (coordinate.path(), units.to_owned());
+    let (coordinate, units) = (coordinate.path(), units.escape_debug().to_string());
     if units.to_ascii_lowercase().starts_with("rad") {
         Err(Error::CoordinateRadians { coordinate, units })
     } else {

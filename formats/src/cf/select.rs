@@ -93,7 +93,7 @@ impl Labels {
             _ => format!("{}, ..., {}", show(0..LISTED_FIRST), show(len - LISTED_LAST..len)),
         };
         match self {
-            Labels::Numbers(_, Some(unit)) => format!("{list} ({unit})"),
+            Labels::Numbers(_, Some(unit)) => format!("{list} ({})", unit.escape_debug()),
             _ => list,
         }
     }
@@ -191,10 +191,10 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
     for At { dimension: name, place } in at {
         let number = dimension_named(dataset, variable, name)?;
         if sphere.contains(&number) {
-            return Err(Error::SphereDimension { dimension: name.clone() });
+            return Err(Error::SphereDimension { dimension: name.escape_debug().to_string() });
         }
         if asked[number].replace(place).is_some() {
-            return Err(Error::SelectedTwice { dimension: name.clone() });
+            return Err(Error::SelectedTwice { dimension: name.escape_debug().to_string() });
         }
     }
     let mut chosen = Chosen { places: vec![None; dimensions.len()], series: None, times: Vec::new() };
@@ -210,11 +210,11 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
             Some(Place::Value(text)) => {
                 let places = labels.matching(text);
                 if places.is_empty() {
-                    let (dimension, place, values) = (name(), text.clone(), labels.listed());
+                    let (dimension, place, values) = (name(), text.escape_debug().to_string(), labels.listed());
                     return Err(Error::NoSuchPlace { dimension, place, values });
                 }
                 if places.len() > 1 && !is_time {
-                    let (dimension, place) = (name(), text.clone());
+                    let (dimension, place) = (name(), text.escape_debug().to_string());
                     return Err(Error::SeveralPlaces { dimension, place, count: places.len(), first: places[0] });
                 }
                 places
@@ -233,10 +233,10 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
             chosen.series = Some((number, places));
         }
     }
-    if let Some(coordinate) = scalar_time(dataset, variable).filter(|_| chosen.times.is_empty()) {
-        if let Labels::Times(times, _) = times(coordinate, &values(dataset, coordinate, &[])?) {
-            chosen.times = times;
-        }
+    if let Some(coordinate) = scalar_time(dataset, variable).filter(|_| chosen.times.is_empty())
+        && let Labels::Times(times, _) = times(coordinate, &values(dataset, coordinate, &[])?)
+    {
+        chosen.times = times;
     }
     Ok(chosen)
 }
@@ -252,7 +252,7 @@ fn dimension_named(dataset: &dyn Dataset, variable: &Variable, name: &str) -> Re
         .or_else(|| position(&|d| coordinate(d).is_some_and(|c| c.eq_ignore_ascii_case(name))));
     named.ok_or_else(|| Error::NoSuchDimension {
         variable: variable.path(),
-        dimension: name.to_owned(),
+        dimension: name.escape_debug().to_string(),
         dimensions: shape(variable),
     })
 }

@@ -192,7 +192,7 @@ impl TimeUnits {
             Some(unit) => {
                 let per_day = (DAY / unit) as f64;
                 let days = (value / per_day).floor();
-                if !(days.abs() < DAYS_MAX) {
+                if days.is_nan() || days.abs() > DAYS_MAX {
                     return None;
                 }
                 day += days as i64;
@@ -200,7 +200,7 @@ impl TimeUnits {
                 milliseconds += ((value - days * per_day) * unit as f64).round() as i64;
             }
             None => {
-                if !(value.abs() < DAYS_MAX / 30.0) {
+                if value.is_nan() || value.abs() > DAYS_MAX / 30.0 {
                     return None;
                 }
                 let (year, month, of_month) = self.calendar.date(day);

@@ -15,6 +15,10 @@ const DIMENSIONS: u32 = 10;
 const VARIABLES: u32 = 11;
 const ATTRIBUTES: u32 = 12;
 
+/// The longest name, and the most dimensions of a variable, that libnetcdf has room for.
+const NAME_MAX: u64 = 256;
+const DIMENSIONS_MAX: u64 = 1024;
+
 /// The number of records of a file that was written as a stream: unknown.
 const STREAMING: u64 = u32::MAX as u64;
 
@@ -77,7 +81,7 @@ impl<R: Read> Header<R> {
 
     fn skip_name(&mut self) -> io::Result<()> {
         let len = self.count()?;
-        self.skip(len)
+        if len <= NAME_MAX { self.skip(len) } else { Err(damaged()) }
     }
 
     /// The number of entries of a list.
@@ -121,7 +125,11 @@ impl<R: Read> Header<R> {
         for _ in 0..self.list(VARIABLES)? {
             self.skip_name()?;
             let (mut values, mut recorded) = (1u128, false);
-            for i in 0..self.count()? {
+            let dimensions = self.count()?;
+            if dimensions > DIMENSIONS_MAX {
+                return Err(damaged());
+            }
+            for i in 0..dimensions {
                 let dimension = usize::try_from(self.count()?).map_err(|_| damaged())?;
                 match *lengths.get(dimension).ok_or_else(damaged)? {
                     // The dimension of records is said to have length 0.

@@ -122,8 +122,8 @@ impl Slab {
         (low.y < high.y && height > 0.0).then_some(Slab { height, ends })
     }
 
-    /// The area west of a meridian, whose x at the equator is given like that of the pixel's centre: from a meridian that
-    /// is upright here.
+    /// The area west of a meridian. The meridian's x at the equator and that of the pixel's centre count from a meridian
+    /// that is upright all along the pixel.
     fn west_of(&self, meridian: f64, centre: f64) -> f64 {
         let [a, b] = &self.ends;
         let [at_a, at_b] = [a, b].map(|end| meridian * end.scale - centre);

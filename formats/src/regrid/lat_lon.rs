@@ -237,8 +237,8 @@ fn latitude_axis(values: &[f64], bounds: Option<&[f64]>, periodic: bool) -> Resu
     let points = ascending(LATITUDE, values, &clamped)?;
     let mut cells = match bounds {
         Some(bounds) => {
-            check_latitudes("latitude bound", bounds)?;
             let pairs = pairs(LATITUDE, values.len(), bounds)?;
+            check_latitudes("latitude bound", bounds)?;
             let cell = |&p: &Point| cell(LATITUDE, p, pairs[p.index], &[sorted(pairs[p.index])]);
             let mut cells: Vec<Cell> = points.iter().map(cell).collect::<Result<_, _>>()?;
             join(LATITUDE, &mut cells)?;
@@ -272,8 +272,8 @@ fn longitude_axis(values: &[f64], bounds: Option<&[f64]>) -> Result<Axis, Error>
     let points: Vec<Point> = all.iter().copied().filter(|p| Some(p.index) != repeated).collect();
     let cells = match bounds {
         Some(bounds) => {
-            check_longitudes("longitude bound", bounds)?;
             let pairs = pairs(LONGITUDE, values.len(), bounds)?;
+            check_longitudes("longitude bound", bounds)?;
             let cell = |&p: &Point| cell(LONGITUDE, p, pairs[p.index], &about(p.degrees, pairs[p.index]));
             let mut cells: Vec<Cell> = all.iter().map(cell).collect::<Result<_, _>>()?;
             // Two columns at one longitude may also be the halves of one cell.

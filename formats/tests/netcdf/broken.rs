@@ -31,10 +31,10 @@ fn coordinates_that_are_no_degrees() {
             assert!(matches!(error, Error::CoordinateRadians { .. }), "{told}");
             assert!(told.contains(&format!("'lat' is in '{units}', but degrees are needed")), "{told}");
         }
-        for units in ["m", "km", "1", "metres"] {
+        for units in ["m", "km", "1", "metres", "new\nline"] {
             let (error, told) = told(&with_units(units, named));
             assert!(matches!(error, Error::CoordinateUnits { .. }), "{told}");
-            assert!(told.contains(&format!("'lat' is in '{units}', not degrees")), "{told}");
+            assert!(told.contains(&format!("'lat' is in '{}', not degrees", units.escape_debug())), "{told}");
         }
     }
     // Radians and metres that do not say so.
@@ -247,7 +247,7 @@ fn bytes_changed_anywhere() {
         let bytes = fs::read(&file.scratch().path).unwrap();
         let header = bytes.len() - 8 * (LATITUDES * LONGITUDES + LATITUDES + LONGITUDES);
         for at in 0..header {
-            for with in [0x7f, 0xff] {
+            for with in [0, 1, 0x0b, 0x7f, 0x80, 0xff] {
                 let mut changed = bytes.clone();
                 changed[at] = with;
                 let scratch = scratch(&changed);
@@ -256,6 +256,18 @@ fn bytes_changed_anywhere() {
             }
         }
     }
+}
+
+#[test]
+fn names_that_are_too_long() {
+    let mut file = plain();
+    file.format = Format::Classic;
+    let bytes = fs::read(file.scratch().path).unwrap();
+    // The name of the first dimension: its length 3 and "lat", made one of 1000 characters.
+    let at = bytes.windows(8).position(|window| window == b"\0\0\0\x03lat\0").unwrap();
+    let name = [&1000u32.to_be_bytes()[..], &[b'x'; 1000]].concat();
+    let changed = [&bytes[..at], &name, &bytes[at + 8..]].concat();
+    assert!(matches!(problem(read(&scratch(&changed).path)).0, Error::NetcdfHeader));
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn latitude(row: usize) -> f64 {
 /// The field at a row from the south and a column from longitude 0, in units of 0.5 from 0 to 200; missing at some
 /// places.
 fn units(row: usize, column: usize) -> Option<i64> {
-    let missing = (row * 5 + column * 3) % 23 == 0;
+    let missing = (row * 5 + column * 3).is_multiple_of(23);
     (!missing).then(|| ((row * row * 7 + column * 11) % 201) as i64)
 }
 

@@ -16,7 +16,7 @@ fn shared(test: &str, name: &str) -> Option<PathBuf> {
 }
 
 /// The values of the first step, and its date.
-fn first(path: &PathBuf, selection: &Selection) -> (Vec<f64>, Option<String>) {
+fn first(path: &Path, selection: &Selection) -> (Vec<f64>, Option<String>) {
     let mut maps = open(path, selection).unwrap();
     let label = maps.times().first().map(|time| time.label.clone());
     (maps.values(0).unwrap(), label)
