@@ -12,9 +12,11 @@ use std::str::FromStr;
 
 use flate2::read::MultiGzDecoder;
 
+use crate::csv::PointsCsv;
 use crate::healpix_fits::HealpixFits;
 use crate::map::Time;
 use crate::netcdf::Netcdf;
+use crate::ply::SurfacePly;
 use crate::zarr::{self, ZarrStore};
 use crate::{CoordinateSystem, Error, Map, Ordering};
 
@@ -91,10 +93,11 @@ pub struct Regrid {
     pub min_valid: f64,
     /// From points.
     pub gather: Gather,
-    /// Pixels farther than this from any point, in degrees, are masked; unless given, twice the typical distance between
-    /// points.
+    /// Pixels whose centre is farther than this from any point, in degrees, are masked; unless given, twice the typical
+    /// distance between points, which is the median distance to the fourth nearest neighbour (coincident points count
+    /// once).
     pub reach: Option<f64>,
-    /// The point from which a surface is seen; the mean of its vertices unless given.
+    /// The point from which a surface, or points in space, are seen; the mean of its vertices, or of them, unless given.
     pub centre: Option<[f64; 3]>,
     /// Whether, where a ray from the centre crosses a surface more than once, the outermost crossing counts.
     pub allow_folds: bool,
@@ -201,6 +204,8 @@ pub enum TablePlace {
         /// The path of the variable: its name, after its group's.
         variable: String,
     },
+    /// The whole of a file that has but one.
+    File {},
 }
 
 /// The grid of a table or variable.
@@ -230,6 +235,34 @@ pub enum GridDescription {
         longitudes: AxisDescription,
         /// Whether the cells cover the sphere.
         global: bool,
+    },
+    /// Points anywhere.
+    Points {
+        /// Their number.
+        points: usize,
+        /// The coordinate system, where the file names one.
+        coordinates: Option<CoordinateSystem>,
+        /// The typical distance between them, in degrees.
+        spacing: Option<f64>,
+        /// The Nside that is used unless one is given.
+        nside: Option<usize>,
+        /// The share of the sphere that is as near to a point as it must be, unless a reach is given.
+        covered: Option<f64>,
+    },
+    /// A surface of triangles.
+    Surface {
+        /// The number of vertices.
+        vertices: usize,
+        /// The number of triangles.
+        triangles: usize,
+        /// The point that it is seen from unless one is given.
+        centre: [f64; 3],
+        /// The Nside that is used unless one is given.
+        nside: usize,
+        /// The share of the sphere in which it is seen from there.
+        covered: f64,
+        /// The share of the sphere in which it is seen more than once.
+        folded: f64,
     },
 }
 
@@ -306,7 +339,7 @@ pub trait Adapter: Sync {
 }
 
 /// All adapters of files; the first that recognises a file reads it.
-static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &Netcdf];
+static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &Netcdf, &SurfacePly, &PointsCsv];
 
 /// Finds what is selected of a file of any known format.
 ///
@@ -393,7 +426,8 @@ fn looks_like(head: &[u8]) -> &'static str {
     let utf8 = std::str::from_utf8(head).map_or_else(|e| e.error_len().is_none(), |_| true);
     if utf8 && head.iter().all(|&b| b >= b' ' || b"\t\r\n".contains(&b)) {
         let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
-        return if first_line.contains(&b',') { "a text file (perhaps CSV)" } else { "a text file" };
+        let csv = "a text file (perhaps CSV) without columns of longitude and latitude, or of x, y and z";
+        return if first_line.contains(&b',') { csv } else { "a text file" };
     }
     "a file of an unknown kind"
 }

@@ -1,5 +1,6 @@
 //! What can be wrong with a map or a file of one, each said in one sentence with its remedy.
 
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +77,7 @@ pub enum Error {
 
     /// Not a file that any adapter reads.
     #[error(
-        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, and fields in NetCDF files; convert it first"
+        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, fields in NetCDF files, points in CSV files with columns such as lon, lat, and surfaces in PLY files; convert it first"
     )]
     NotRecognised {
         /// What the content looks like.
@@ -578,6 +579,151 @@ pub enum Error {
         value: u64,
     },
 
+    /// Text without the columns that say where points are.
+    #[error(
+        "no line of this text names columns of longitude and latitude, or of x, y and z; add a line such as 'lon,lat,value' before the numbers"
+    )]
+    NoPointColumns,
+    /// Two columns of which either could be the one that is needed.
+    #[error("columns '{first}' and '{second}' could both be the {coordinate}; rename one of them")]
+    TwoCoordinates {
+        /// What is needed, such as "longitude".
+        coordinate: &'static str,
+        /// One column.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Angles that are not in degrees.
+    #[error("the angles in column '{column}' are in radians; convert them to degrees")]
+    RadianColumn {
+        /// The column.
+        column: String,
+    },
+    /// A column that is not there.
+    #[error("there is no column {field}; the columns of values are {columns}")]
+    UnknownColumn {
+        /// The name or number asked for.
+        field: String,
+        /// The columns that could be a map.
+        columns: String,
+    },
+    /// Several columns where one is needed.
+    #[error("several columns could be the map: {columns}; choose one by its name or number with --variable")]
+    SeveralColumns {
+        /// The columns.
+        columns: String,
+    },
+    /// Points that carry nothing.
+    #[error("there is no column of numbers besides {coordinates}; name the column of values with --variable")]
+    NoValueColumn {
+        /// The columns that are no values.
+        coordinates: String,
+    },
+    /// A field that is not given at points.
+    #[error("the points have no dimension '{dimension}' to choose from; leave --select out, or pick the rows first")]
+    NoDimension {
+        /// The dimension asked for.
+        dimension: String,
+    },
+    /// A row with too few or too many cells.
+    #[error("{place} has {found} values but there are {expected} columns; correct it")]
+    RowLength {
+        /// The row.
+        place: String,
+        /// Its values.
+        found: usize,
+        /// The columns that the header names.
+        expected: usize,
+    },
+    /// Something else where a number is needed.
+    #[error("{place} has '{text}' as '{column}', which is not {expected}; correct it")]
+    BadNumber {
+        /// The row or vertex.
+        place: String,
+        /// The column.
+        column: String,
+        /// What is there.
+        text: String,
+        /// What is needed.
+        expected: &'static str,
+    },
+    /// A point without a direction.
+    #[error("{place} lies at the centre, so it has no direction from there; name another point with --centre")]
+    AtCentre {
+        /// The row or vertex.
+        place: String,
+    },
+    /// No point with a value.
+    #[error("column '{column}' has no value at any point; choose another with --variable")]
+    NoValues {
+        /// The column.
+        column: String,
+    },
+    /// Too few points to know how dense they are.
+    #[error("the points are all at one place, so nothing tells how dense they are; give both --nside and --reach")]
+    OnePlace,
+    /// A way of gathering that cannot be.
+    #[error("{what} is {value}, which is not {expected}; correct it")]
+    Setting {
+        /// The setting, such as "the reach".
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// A PLY header that is wrong.
+    #[error("line {line} of the header is '{text}', which is not {expected}; correct it")]
+    PlyHeader {
+        /// The line, from 1.
+        line: usize,
+        /// The line's text.
+        text: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// A PLY file that is no surface with values.
+    #[error("this PLY file has no {missing}; save it as a surface of triangles with a value at each vertex")]
+    PlyLacks {
+        /// What is missing.
+        missing: &'static str,
+    },
+    /// A PLY file that ends too early.
+    #[error(
+        "the file ends after {found} of {count} entries of '{element}'; it is cut short or its header is wrong, so fetch it again"
+    )]
+    PlyTruncated {
+        /// The element.
+        element: String,
+        /// Complete entries.
+        found: u64,
+        /// The entries that the header promises.
+        count: u64,
+    },
+    /// A face with a corner that is not there.
+    #[error(
+        "face {face} (from 0) has vertex {vertex}, but the file has {vertices} vertices, numbered from 0; correct the faces"
+    )]
+    FaceVertex {
+        /// The face.
+        face: u64,
+        /// The number of the vertex, as the file has it.
+        vertex: f64,
+        /// The number of vertices.
+        vertices: u64,
+    },
+    /// A surface that is not seen from its centre once in each direction.
+    #[error(
+        "seen from the centre, {never} of the sphere has no surface and {several} has more than one layer; name a point inside with --centre, or take the outermost layer with --allow-folds"
+    )]
+    Crossings {
+        /// Share of the sphere whose rays never cross the surface.
+        never: Percent,
+        /// Share of the sphere whose rays cross it more than once.
+        several: Percent,
+    },
+
     /// One map for each of several times where one map is needed.
     #[error("there is a map for each of {steps} times; choose one with --select")]
     Steps {
@@ -851,6 +997,27 @@ impl Error {
             io::ErrorKind::NotFound => Error::Missing,
             _ => Error::Io { action, cause },
         }
+    }
+}
+
+/// A share of a number of pixels, shown in percent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Percent {
+    /// The pixels in question.
+    pub pixels: usize,
+    /// All pixels.
+    pub of: usize,
+}
+
+impl fmt::Display for Percent {
+    /// With two digits or more, so that what is small does not look like nothing.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.pixels == 0 {
+            return f.write_str("0%");
+        }
+        let percent = 100.0 * self.pixels as f64 / self.of as f64;
+        let decimals = (1.0 - percent.log10().floor()).max(1.0) as usize;
+        write!(f, "{percent:.decimals$}%")
     }
 }
 

@@ -8,7 +8,10 @@ mod adapter;
 mod canvas;
 mod cf;
 mod cfitsio;
+mod columns;
+mod csv;
 mod dataset;
+mod directions;
 mod error;
 mod healpix;
 mod healpix_cf;
@@ -20,8 +23,11 @@ mod map;
 mod multi_order;
 mod netcdf;
 mod netcdf_write;
+mod ply;
+mod points;
 mod regrid;
 mod save;
+mod surface;
 mod zarr;
 mod zarr_zstd;
 
@@ -29,7 +35,7 @@ pub use adapter::{
     Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
     Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, open, read,
 };
-pub use error::Error;
+pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};

@@ -128,6 +128,11 @@ impl Map {
         self.values
     }
 
+    /// The share of pixels that have a value.
+    pub(crate) fn share_valid(&self) -> f64 {
+        self.values.iter().filter(|v| !v.is_nan()).count() as f64 / self.values.len() as f64
+    }
+
     /// Masks every pixel at which `mask` is below `threshold` or is itself masked.
     ///
     /// # Errors

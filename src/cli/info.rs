@@ -17,7 +17,7 @@ use super::options::{Format, decimals, nside, print, shown};
 /// What a file holds: its grids, dimensions and coordinate systems, and each field's unit, range and masked fraction.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// FITS or NetCDF file.
+    /// FITS, NetCDF, CSV or PLY file.
     file: PathBuf,
     /// For multi-order (UNIQ) files: Nside to bring the map to [default: that of its finest cells].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
@@ -117,6 +117,7 @@ fn read(arguments: &Arguments, table: &TableDescription, number: usize) -> Resul
     let (field, hdu) = match &table.place {
         TablePlace::Hdu { hdu, .. } => (Field::Number(number), Some(*hdu)),
         TablePlace::Variable { variable } => (Field::Name(variable.clone()), None),
+        TablePlace::File {} => (Field::Number(number), None),
     };
     let nside = arguments.nside.filter(|_| multi_order);
     let selection = Selection { field: Some(field), hdu, nside, ..Selection::default() };
@@ -134,6 +135,8 @@ fn unread(error: Error) -> Result<Unread, Error> {
     match problem {
         Error::ColumnKind { found, .. } => Ok(Unread::NotAMap((*found).to_owned())),
         Error::EmptyDimension { dimension, .. } => Ok(Unread::NotAMap(format!("empty along '{dimension}'"))),
+        Error::BadNumber { place, text, .. } => Ok(Unread::NotAMap(format!("'{text}' in {place}"))),
+        Error::NoValues { .. } => Ok(Unread::NotAMap("without values".to_owned())),
         Error::DimensionLeft { .. } => Ok(Unread::Select),
         _ => Err(error),
     }
@@ -157,6 +160,7 @@ fn write_text(out: &mut String, arguments: &Arguments, report: &Report<'_>) -> s
                 writeln!(out, "\nHDU {hdu}{name}")?;
             }
             TablePlace::Variable { variable } => writeln!(out, "\nVariable '{variable}'")?,
+            TablePlace::File {} => writeln!(out)?,
         }
         write_grid(out, &table.grid)?;
         for dimension in &table.dimensions {
@@ -224,6 +228,27 @@ fn write_grid(out: &mut String, grid: &GridDescription) -> std::fmt::Result {
                 writeln!(out, "  {name:<12} {first} to {last} deg{spacing}")?;
             }
             Ok(())
+        }
+        GridDescription::Points { points, coordinates, spacing, nside, covered } => {
+            writeln!(out, "  points       {points}")?;
+            if let Some(coordinates) = coordinates {
+                writeln!(out, "  coordinates  {}", format!("{coordinates:?}").to_lowercase())?;
+            }
+            match (spacing, nside, covered) {
+                (Some(spacing), Some(nside), Some(covered)) => {
+                    writeln!(out, "  spacing      {spacing:.4} deg, typically")?;
+                    writeln!(out, "  Nside        {nside}, unless --nside is given")?;
+                    writeln!(out, "  covers       {:.2}% of the sphere, unless --reach is given", 100.0 * covered)
+                }
+                _ => writeln!(out, "  spacing      unknown, as all are at one place; give --nside and --reach"),
+            }
+        }
+        GridDescription::Surface { vertices, triangles, centre: [x, y, z], nside, covered, folded } => {
+            writeln!(out, "  surface      {vertices} vertices, {triangles} triangles")?;
+            writeln!(out, "  centre       {x:.6}, {y:.6}, {z:.6}, unless --centre is given")?;
+            writeln!(out, "  Nside        {nside}, unless --nside is given")?;
+            let [covered, folded] = [covered, folded].map(|share| 100.0 * share);
+            writeln!(out, "  covers       {covered:.2}% of the sphere, {folded:.2}% more than once")
         }
     }
 }
