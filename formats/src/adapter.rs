@@ -368,6 +368,11 @@ pub fn describe(path: &Path) -> Result<Description, Error> {
     adapter(path).and_then(|adapter| adapter.describe(path)).map_err(|e| e.of(path))
 }
 
+/// Whether a path is a folder that is read as if it were a file: a Zarr store.
+pub fn is_store(path: &Path) -> bool {
+    path.is_dir() && zarr::is_zarr(path)
+}
+
 /// The adapter for a file, or for a folder that is a store.
 fn adapter(path: &Path) -> Result<&'static dyn Adapter, Error> {
     let metadata = std::fs::metadata(path).map_err(Error::io("open it"))?;

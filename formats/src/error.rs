@@ -59,7 +59,7 @@ pub enum Error {
     #[error("there is no such file; check the name and the folder")]
     Missing,
     /// A folder was named where a file is needed.
-    #[error("this is a folder; name a file in it")]
+    #[error("this is a folder, but neither a file nor a Zarr store; name a file in it")]
     Folder,
     /// A pipe, device or socket was named where a file is needed.
     #[error("this is not a regular file but a pipe or a device; save the data to a file first")]
@@ -77,7 +77,7 @@ pub enum Error {
 
     /// Not a file that any adapter reads.
     #[error(
-        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, fields in NetCDF files, points in CSV files with columns such as lon, lat, and surfaces in PLY files; convert it first"
+        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, fields in NetCDF files and Zarr stores, points in CSV files with columns such as lon, lat, and surfaces in PLY files; convert it first"
     )]
     NotRecognised {
         /// What the content looks like.
@@ -409,7 +409,9 @@ pub enum Error {
         expected: &'static str,
     },
     /// No variable that could be a map.
-    #[error("no variable has dimensions of latitude and longitude in degrees; the variables are {variables}")]
+    #[error(
+        "no variable is on a HEALPix grid, or has dimensions of latitude and longitude in degrees; the variables are {variables}"
+    )]
     NoLatLon {
         /// The variables and their dimensions.
         variables: String,
@@ -947,6 +949,12 @@ pub enum Error {
         longitudes: usize,
     },
 
+    /// Values that could not be made, for a reason of the one who makes them.
+    #[error("{reason}")]
+    NoResult {
+        /// The reason.
+        reason: String,
+    },
     /// A file that is not to be replaced.
     #[error("the file exists; choose another name, or overwrite it with --overwrite")]
     Exists,

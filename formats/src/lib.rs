@@ -33,7 +33,7 @@ mod zarr_zstd;
 
 pub use adapter::{
     Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
-    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, open, read,
+    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, is_store, open, read,
 };
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};

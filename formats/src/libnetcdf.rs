@@ -5,11 +5,13 @@
 //! libnetcdf takes some names for addresses on the net (`http://...`, `file#mode=zarr`), so it is given nothing but
 //! absolute paths; and backslashes for slashes, so a path with one is reached by a link. It is not thread-safe: each call takes the lock that it shares with HDF5.
 
+use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int};
 use std::fmt::Display;
 use std::path::Path;
 use std::ptr;
 
+use hdf5_sys::h5e::{H5E_DEFAULT, H5Eset_auto2};
 use netcdf_sys as sys;
 
 use crate::Error;
@@ -38,6 +40,8 @@ pub(crate) struct VariableHead {
     /// libnetcdf's number of the type.
     pub(crate) kind: sys::nc_type,
     pub(crate) dimensions: Vec<Dimension>,
+    /// The shape of the chunks in which values are compressed; nothing where there are none.
+    pub(crate) chunks: Option<Vec<usize>>,
 }
 
 /// The start and the length of what is read along each dimension.
@@ -53,9 +57,24 @@ impl Part {
     }
 }
 
+thread_local! {
+    /// Whether HDF5 keeps quiet in this thread.
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Keeps HDF5 from printing its errors, of which libnetcdf tells. It has a printer for each thread.
+fn quieten() {
+    if !QUIET.replace(true) {
+        // SAFETY: the caller holds the lock of HDF5; no function to call is what takes the place of the printer, which
+        // needs no data. A failure leaves the printer where it is.
+        unsafe { H5Eset_auto2(H5E_DEFAULT, None, ptr::null_mut()) };
+    }
+}
+
 /// Calls libnetcdf, alone in the process.
 fn call(action: impl Display, function: impl FnOnce() -> c_int) -> Result<(), Error> {
     let _guard = sys::libnetcdf_lock.lock();
+    quieten();
     match function() {
         sys::NC_NOERR => Ok(()),
         status => {
@@ -164,8 +183,20 @@ impl NetcdfReader {
             })?;
             Ok(Dimension { name: name(&buffer), len })
         };
-        let dimensions = ids.into_iter().map(dimension).collect::<Result<_, Error>>()?;
-        Ok(VariableHead { id, name: name(&buffer), kind, dimensions })
+        let dimensions = ids.into_iter().map(dimension).collect::<Result<Vec<_>, Error>>()?;
+        let chunks = self.chunks(id, dimensions.len());
+        Ok(VariableHead { id, name: name(&buffer), kind, dimensions, chunks })
+    }
+
+    /// The shape of a variable's chunks, where it has any.
+    fn chunks(&self, id: VariableId, dimensions: usize) -> Option<Vec<usize>> {
+        let (mut storage, mut chunks) = (sys::NC_CONTIGUOUS, vec![0; dimensions]);
+        // SAFETY: the variable is one of the open file's, and there is room for a length along each of its dimensions.
+        let inquired = call("describe its chunks", || unsafe {
+            sys::nc_inq_var_chunking(id.0, id.1, &mut storage, chunks.as_mut_ptr())
+        });
+        let chunked = inquired.is_ok() && storage == sys::NC_CHUNKED && !chunks.contains(&0);
+        chunked.then_some(chunks)
     }
 
     /// The attributes of a group.

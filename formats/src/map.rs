@@ -124,7 +124,7 @@ impl Map {
     }
 
     /// The values alone.
-    pub(crate) fn into_values(self) -> Vec<f64> {
+    pub fn into_values(self) -> Vec<f64> {
         self.values
     }
 

@@ -5,15 +5,19 @@
 
 mod classic;
 
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
 
 use netcdf_sys as sys;
 
-use crate::dataset::{Array, Attribute, Dataset, Kind, Variable};
+use crate::dataset::{Array, Attribute, Dataset, Dimension, Kind, Variable};
 use crate::libnetcdf::{NetcdfReader, Part, VariableHead};
 use crate::{Adapter, Description, Error, Maps, Selection, interpret};
+
+/// Steps of chunked variables are read together up to this many bytes: 512 MiB.
+const BLOCK_MAX: usize = 1 << 29;
 
 /// A NetCDF file.
 pub(crate) struct NetcdfFile {
@@ -23,6 +27,17 @@ pub(crate) struct NetcdfFile {
     variables: Vec<Variable>,
     /// What libnetcdf knows of the variables, in the same order.
     heads: Vec<VariableHead>,
+    /// The steps that were read last, where chunks hold several.
+    kept: RefCell<Option<Block>>,
+}
+
+/// Steps of a variable that are read together, so that the chunks that hold them are decompressed but once.
+#[derive(Debug, PartialEq)]
+struct Block {
+    /// The variable's place among all.
+    variable: usize,
+    ranges: Vec<Range<usize>>,
+    values: Array,
 }
 
 /// The adapter for NetCDF files, whatever their grid.
@@ -77,23 +92,11 @@ impl NetcdfFile {
             }
             groups.push((group, reader.group_attributes(id)?));
         }
-        Ok(NetcdfFile { reader, groups, variables, heads })
-    }
-}
-
-impl Dataset for NetcdfFile {
-    fn variables(&self) -> &[Variable] {
-        &self.variables
+        Ok(NetcdfFile { reader, groups, variables, heads, kept: RefCell::new(None) })
     }
 
-    fn group_attributes(&self, group: &str) -> &[(String, Attribute)] {
-        self.groups.iter().find(|(path, _)| path == group).map_or(&[], |(_, attributes)| attributes)
-    }
-
-    fn read(&self, variable: &Variable, ranges: &[Range<usize>]) -> Result<Array, Error> {
-        let number = self.variables.iter().position(|v| v.name == variable.name && v.group == variable.group);
-        let kind = || Error::VariableKind { variable: variable.path(), found: "neither numbers nor text" };
-        let head = &self.heads[number.ok_or_else(kind)?];
+    /// Reads a part of a variable.
+    fn part(&self, variable: &Variable, head: &VariableHead, ranges: &[Range<usize>]) -> Result<Array, Error> {
         let mut part = Part {
             start: ranges.iter().map(|range| range.start).collect(),
             count: ranges.iter().map(ExactSizeIterator::len).collect(),
@@ -116,7 +119,85 @@ impl Dataset for NetcdfFile {
                 self.reader.read_characters(head, &part, width).map(Array::Text)
             }
             Kind::Text => self.reader.read_strings(head, &part).map(Array::Text),
-            Kind::Other => Err(kind()),
+            Kind::Other => Err(no_field(variable)),
+        }
+    }
+}
+
+fn no_field(variable: &Variable) -> Error {
+    Error::VariableKind { variable: variable.path(), found: "neither numbers nor text" }
+}
+
+/// The dimension along which more than these ranges is to be read, and from where to where: that of steps where the
+/// chunks hold several, as many of them as fit into `most` values.
+fn block(
+    chunks: &[usize],
+    dimensions: &[Dimension],
+    ranges: &[Range<usize>],
+    most: usize,
+) -> Option<(usize, Range<usize>)> {
+    let along = ranges.iter().zip(chunks).position(|(range, &chunk)| range.len() == 1 && chunk > 1)?;
+    let one = ranges.iter().try_fold(1usize, |product, range| product.checked_mul(range.len()))?;
+    let most = if one == 0 { 0 } else { most / one };
+    let (step, chunk) = (ranges[along].start, chunks[along]);
+    let steps = most.min(chunk);
+    let first = step - step % chunk;
+    let start = step - (step - first) % steps.max(1);
+    let end = (start + steps).min(first + chunk).min(dimensions[along].len);
+    (steps > 1).then_some((along, start..end))
+}
+
+impl Block {
+    /// One step of it, along a dimension.
+    fn step(&self, along: usize, step: usize) -> Array {
+        let inner = self.ranges[along + 1..].iter().map(ExactSizeIterator::len).product();
+        let len = self.ranges[along].len();
+        let step = step - self.ranges[along].start;
+        match &self.values {
+            Array::Real(values) => Array::Real(cut(values, inner, len, step)),
+            Array::Whole(values) => Array::Whole(cut(values, inner, len, step)),
+            Array::Text(values) => Array::Text(cut(values, inner, len, step)),
+        }
+    }
+}
+
+/// One of `len` places along a dimension, within which the others have `inner` values.
+fn cut<T: Clone>(values: &[T], inner: usize, len: usize, place: usize) -> Vec<T> {
+    values.chunks_exact(inner).skip(place).step_by(len).flatten().cloned().collect()
+}
+
+impl Dataset for NetcdfFile {
+    fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    fn group_attributes(&self, group: &str) -> &[(String, Attribute)] {
+        self.groups.iter().find(|(path, _)| path == group).map_or(&[], |(_, attributes)| attributes)
+    }
+
+    fn read(&self, variable: &Variable, ranges: &[Range<usize>]) -> Result<Array, Error> {
+        let number = self.variables.iter().position(|v| v.name == variable.name && v.group == variable.group);
+        let number = number.ok_or_else(|| no_field(variable))?;
+        let head = &self.heads[number];
+        let chunks = head.chunks.as_deref().filter(|_| variable.kind != Kind::Text);
+        let block = chunks.and_then(|chunks| block(chunks, &variable.dimensions, ranges, BLOCK_MAX / size_of::<f64>()));
+        let Some((along, range)) = block else { return self.part(variable, head, ranges) };
+        let step = ranges[along].start;
+        let mut together = ranges.to_vec();
+        together[along] = range;
+        let mut kept = self.kept.borrow_mut();
+        if kept.as_ref().is_none_or(|block| block.variable != number || block.ranges != together) {
+            // The old block makes room for the new one.
+            *kept = None;
+            match self.part(variable, head, &together) {
+                Ok(values) => *kept = Some(Block { variable: number, ranges: together, values }),
+                Err(Error::VariableMemory { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        match kept.as_ref() {
+            Some(block) => Ok(block.step(along, step)),
+            None => self.part(variable, head, ranges),
         }
     }
 }
@@ -143,4 +224,40 @@ fn kind(kind: sys::nc_type) -> Kind {
 /// How many dimensions, 0 or 1, run along the characters of a text.
 fn characters(head: &VariableHead) -> usize {
     usize::from(head.kind == sys::NC_CHAR && !head.dimensions.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_a_chunk_are_read_together() {
+        let dimensions: Vec<_> = [10, 4, 6].map(|len| Dimension { name: "d".to_owned(), len }).to_vec();
+        let along = |chunks: [usize; 3], ranges: [Range<usize>; 3], most| block(&chunks, &dimensions, &ranges, most);
+        let step = |step: usize| [step..step + 1, 0..4, 0..6];
+        for (chunk, at, most, expected) in [
+            (1, 3, 1000, None),
+            (4, 3, 1000, Some((0, 0..4))),
+            (4, 5, 1000, Some((0, 4..8))),
+            (4, 9, 1000, Some((0, 8..10))),
+            // Room for 3, 2 and 1 steps.
+            (8, 2, 24 * 3, Some((0, 0..3))),
+            (8, 7, 24 * 3, Some((0, 6..8))),
+            (8, 9, 24 * 2, Some((0, 8..10))),
+            (8, 9, 24 * 2 - 1, None),
+            (8, 9, 0, None),
+        ] {
+            assert_eq!(along([chunk, 2, 3], step(at), most), expected, "{chunk} {at} {most}");
+        }
+        assert_eq!(along([4, 4, 6], [0..10, 0..4, 0..6], 1000), None);
+        assert_eq!(along([1, 4, 6], [3..4, 1..2, 0..6], 1000), Some((1, 0..4)));
+    }
+
+    #[test]
+    fn a_step_is_cut_out() {
+        let values = Array::Whole((0..2 * 3 * 2).collect());
+        let block = Block { variable: 0, ranges: vec![0..2, 4..7, 0..2], values };
+        assert_eq!(block.step(1, 5), Array::Whole(vec![2, 3, 8, 9]));
+        assert_eq!(Block { ranges: vec![4..10, 0..2], ..block }.step(0, 4), Array::Whole(vec![0, 1]));
+    }
 }

@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use std::fmt::Display;
 use std::path::Path;
 
-use netcdf::{AttributeValue, Extent, FileMut, NcTypeDescriptor};
+use netcdf::{AttributeValue, Extent, FileMut, NcTypeDescriptor, VariableMut};
 use rayon::prelude::*;
 
 use crate::canvas::CHUNK;
@@ -24,13 +24,15 @@ pub struct NetcdfLayout {
     pub float32: bool,
     /// The columns, each a data variable.
     pub columns: Vec<NetcdfColumn>,
+    /// What each step has one number of, each a variable without pixels.
+    pub numbers: Vec<NetcdfColumn>,
     /// The attributes of the file, whose names are the keys in lower case; their comments are not written.
     pub attributes: Vec<Card>,
     /// The unit and the calendar of time, where there is an axis of it.
     pub time: Option<TimeAxis>,
 }
 
-/// One column of all steps.
+/// One column, or one number, of all steps.
 #[derive(Clone, Debug)]
 pub struct NetcdfColumn {
     /// Its name. What is neither a letter of ASCII, a digit nor '_' is written as '_', since CF has no other names.
@@ -56,6 +58,8 @@ pub struct NetcdfWriter {
     file: FileMut,
     /// The names of the data variables.
     names: Vec<String>,
+    /// The names of the variables of numbers.
+    numbers: Vec<String>,
     /// Number of steps written.
     steps: usize,
 }
@@ -84,20 +88,23 @@ impl NetcdfWriter {
         // libnetcdf takes some relative paths for addresses on the net.
         let path = std::path::absolute(path).map_err(Error::io("write it"))?;
         let file = netcdf::create(path).map_err(refused("create it"))?;
-        let mut writer = NetcdfWriter { names: names(&layout.columns), layout, file, steps: 0 };
+        let mut names = names(layout.columns.iter().chain(&layout.numbers));
+        let numbers = names.split_off(layout.columns.len());
+        let mut writer = NetcdfWriter { names, numbers, layout, file, steps: 0 };
         writer.define(level).map_err(refused("write its header"))?;
         writer.number_pixels().map_err(refused("number its pixels"))?;
         Ok(writer)
     }
 
     /// Writes the next step: for each column a value for each pixel in RING order (whatever the ordering of the file),
-    /// NaN where masked, and its time where the file has an axis of it.
+    /// NaN where masked, its numbers, and its time where the file has an axis of it.
     ///
     /// # Errors
     /// [`Error::ColumnLength`], [`Error::StepTime`], or [`Error::NetcdfWrite`].
-    pub fn append(&mut self, columns: &[&[f64]], time: Option<&Time>) -> Result<(), Error> {
+    pub fn append(&mut self, columns: &[&[f64]], numbers: &[f64], time: Option<&Time>) -> Result<(), Error> {
         let (grid, axis) = (self.layout.grid, self.layout.time.is_some());
-        if axis != time.is_some() || columns.len() != self.names.len() || !axis && self.steps > 0 {
+        let all = columns.len() == self.names.len() && numbers.len() == self.numbers.len();
+        if axis != time.is_some() || !all || !axis && self.steps > 0 {
             return Err(Error::StepTime { step: self.steps + 1 });
         }
         for (values, name) in columns.iter().zip(&self.names) {
@@ -112,6 +119,14 @@ impl NetcdfWriter {
         }
         if let Some(time) = time {
             self.put(TIME, &[time.value], [self.steps.into()]).map_err(refused("write a time"))?;
+        }
+        for (place, number) in numbers.iter().enumerate() {
+            let name = self.numbers[place].clone();
+            let written = match time {
+                Some(_) => self.put(&name, &[*number], [self.steps.into()]),
+                None => self.put::<_, 0>(&name, &[*number], []),
+            };
+            written.map_err(refused(format_args!("write '{name}'")))?;
         }
         for (number, values) in columns.iter().enumerate() {
             let written = if self.layout.float32 {
@@ -135,7 +150,7 @@ impl NetcdfWriter {
 
     /// Defines dimensions, variables and attributes.
     fn define(&mut self, level: u8) -> netcdf::Result<()> {
-        let NetcdfWriter { layout, file, names, .. } = self;
+        let NetcdfWriter { layout, file, names, numbers, .. } = self;
         let pixels = layout.grid.pixels();
         let mut given = HashSet::from(["Conventions".to_owned()]);
         file.add_attribute("Conventions", "CF-1.13")?;
@@ -171,10 +186,17 @@ impl NetcdfWriter {
             let mut time = file.add_variable::<f64>(TIME, &[TIME])?;
             time.put_attribute("standard_name", "time")?;
             time.put_attribute("axis", "T")?;
-            time.put_attribute("units", axis.units.as_str())?;
-            time.put_attribute("calendar", axis.calendar.as_str())?;
+            for (attribute, text) in [("units", &axis.units), ("calendar", &axis.calendar)] {
+                if !text.is_empty() {
+                    time.put_attribute(attribute, text.as_str())?;
+                }
+            }
             dimensions.insert(0, TIME);
             chunks.insert(0, 1);
+        }
+        let steps = if layout.time.is_some() { &[TIME][..] } else { &[] };
+        for (number, name) in layout.numbers.iter().zip(numbers) {
+            describe(&mut file.add_variable::<f64>(name, steps)?, number)?;
         }
         for (column, name) in layout.columns.iter().zip(names) {
             let mut variable = if layout.float32 {
@@ -188,11 +210,7 @@ impl NetcdfWriter {
             };
             variable.set_chunking(&chunks)?;
             variable.set_compression(DEFLATE, true)?;
-            for (attribute, text) in [("units", &column.unit), ("long_name", &column.long_name)] {
-                if !text.is_empty() {
-                    variable.put_attribute(attribute, text.as_str())?;
-                }
-            }
+            describe(&mut variable, column)?;
             variable.put_attribute("grid_mapping", GRID)?;
         }
         Ok(())
@@ -251,15 +269,25 @@ fn refused(action: impl Display) -> impl FnOnce(netcdf::Error) -> Error {
     }
 }
 
-/// The names of the data variables: legal, and each but once.
-fn names(columns: &[NetcdfColumn]) -> Vec<String> {
+/// Says what a variable is.
+fn describe(variable: &mut VariableMut<'_>, column: &NetcdfColumn) -> netcdf::Result<()> {
+    for (attribute, text) in [("units", &column.unit), ("long_name", &column.long_name)] {
+        if !text.is_empty() {
+            variable.put_attribute(attribute, text.as_str())?;
+        }
+    }
+    Ok(())
+}
+
+/// The names of the variables: legal, and each but once.
+fn names<'c>(columns: impl Iterator<Item = &'c NetcdfColumn>) -> Vec<String> {
     let mut taken = HashSet::from([GRID, CELL, TIME].map(str::to_owned));
     let name = |column: &NetcdfColumn| {
         let name = unlike(&taken, legal(&column.name));
         taken.insert(name.clone());
         name
     };
-    columns.iter().map(name).collect()
+    columns.map(name).collect()
 }
 
 /// A name of letters, digits and '_' that begins with a letter.

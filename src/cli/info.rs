@@ -3,22 +3,31 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use anyhow::bail;
 use clap::Args;
 use longan::formats::{
-    self, AxisDescription, Description, DimensionDescription, Error, Field, FieldDescription, GridDescription,
+    self, At, AxisDescription, Description, DimensionDescription, Error, Field, FieldDescription, GridDescription,
     Indexing, Selection, TableDescription, TablePlace,
 };
 use longan::statistics::{Statistics, statistics};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::input::place;
 use super::options::{Format, decimals, nside, print, shown};
 
 /// What a file holds: its grids, dimensions and coordinate systems, and each field's unit, range and masked fraction.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// FITS, NetCDF, CSV or PLY file.
+    /// File of maps: FITS, NetCDF, Zarr, CSV, PLY.
     file: PathBuf,
+    /// This variable or column only, by its name.
+    #[arg(long = "variable", visible_alias = "field", value_name = "NAME")]
+    variable: Option<String>,
+    /// Place along a dimension to give numbers of, by the value of its coordinate or by its number from 0, such as
+    /// level=500, time=1997-12 or time=#0; may be repeated.
+    #[arg(long, value_name = "DIM=VALUE|DIM=#N", value_parser = place)]
+    select: Vec<At>,
     /// For multi-order (UNIQ) files: Nside to bring the map to [default: that of its finest cells].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
     nside: Option<usize>,
@@ -39,6 +48,9 @@ struct Table<'a> {
 
 #[derive(Serialize)]
 struct FieldReport<'a> {
+    /// What --variable takes for its name: its number in its table, or that of the variable in the file.
+    #[serde(skip)]
+    number: usize,
     #[serde(flatten)]
     field: &'a FieldDescription,
     min: Option<f64>,
@@ -52,6 +64,9 @@ struct FieldReport<'a> {
     /// What it holds where that is no map.
     #[serde(skip_serializing_if = "Option::is_none")]
     not_a_map: Option<String>,
+    /// Why there are no numbers of the place that is selected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    not_selected: Option<String>,
     /// The dimensions along which a place has to be chosen before it is read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     select: Vec<&'a str>,
@@ -61,11 +76,19 @@ struct FieldReport<'a> {
 enum Unread {
     NotAMap(String),
     Select,
+    /// What is selected is not there.
+    Elsewhere(String),
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let description = formats::describe(&arguments.file)?;
     let report = report(arguments, &description)?;
+    if report.tables.is_empty() {
+        let fields = description.tables.iter().flat_map(names);
+        let names: Vec<_> = fields.map(|name| format!("'{}'", name.escape_debug())).collect();
+        let wanted = arguments.variable.as_deref().unwrap_or_default().escape_debug();
+        bail!("{}: there is no '{wanted}'; there are {}", shown(&arguments.file), names.join(", "));
+    }
     let mut out = String::new();
     match arguments.format {
         Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&json_of(&report)?)?)?,
@@ -76,10 +99,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Result<Report<'a>> {
     let mut tables = Vec::new();
-    for table in &description.tables {
+    for (place, table) in description.tables.iter().enumerate() {
         let mut fields = Vec::new();
-        for (number, field) in table.fields.iter().enumerate() {
-            let read = read(arguments, table, number);
+        let is_wanted = |name: &str| arguments.variable.as_ref().is_none_or(|wanted| wanted.eq_ignore_ascii_case(name));
+        let whole = matches!(&table.place, TablePlace::Variable { variable } if is_wanted(variable));
+        for (i, field) in table.fields.iter().enumerate().filter(|(_, field)| whole || is_wanted(&field.name)) {
+            let read = read(arguments, table, i);
             let (values, time, unread) = match read {
                 Ok((values, time)) => (Some(values), time, None),
                 Err(e) => (None, None, Some(unread(e)?)),
@@ -89,12 +114,17 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
             let unmasked = of_values.map_or(0, |s| s.unmasked);
             let masked = |all: usize| (all - unmasked) as f64 / all as f64;
             let left = |d: &&DimensionDescription| !d.time && d.len > 1;
-            let (not_a_map, select) = match unread {
-                None => (None, Vec::new()),
-                Some(Unread::NotAMap(found)) => (Some(found), Vec::new()),
-                Some(Unread::Select) => (None, table.dimensions.iter().filter(left).map(|d| d.name.as_str()).collect()),
-            };
+            let (mut not_a_map, mut not_selected, mut select) = (None, None, Vec::new());
+            match unread {
+                None => {}
+                Some(Unread::NotAMap(found)) => not_a_map = Some(found),
+                Some(Unread::Elsewhere(problem)) => not_selected = Some(problem),
+                Some(Unread::Select) => {
+                    select = table.dimensions.iter().filter(left).map(|d| d.name.as_str()).collect()
+                }
+            }
             fields.push(FieldReport {
+                number: if matches!(table.place, TablePlace::Variable { .. }) { place } else { i },
                 field,
                 min: number(|s| s.min),
                 max: number(|s| s.max),
@@ -103,12 +133,23 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
                 masked_fraction: values.map(|values| masked(values.len())),
                 time,
                 not_a_map,
+                not_selected,
                 select,
             });
         }
-        tables.push(Table { table, fields });
+        if !fields.is_empty() || arguments.variable.is_none() {
+            tables.push(Table { table, fields });
+        }
     }
     Ok(Report { format: description.format, tables })
+}
+
+/// What the fields of a table are called: a variable by its path.
+fn names(table: &TableDescription) -> Vec<&str> {
+    match &table.place {
+        TablePlace::Variable { variable } => vec![variable],
+        _ => table.fields.iter().map(|field| field.name.as_str()).collect(),
+    }
 }
 
 /// The values of a field as the file has them, of the first of several times, and which that is.
@@ -120,9 +161,10 @@ fn read(arguments: &Arguments, table: &TableDescription, number: usize) -> Resul
         TablePlace::File {} => (Field::Number(number), None),
     };
     let nside = arguments.nside.filter(|_| multi_order);
-    let selection = Selection { field: Some(field), hdu, nside, ..Selection::default() };
+    let selection = Selection { field: Some(field), hdu, nside, at: arguments.select.clone(), ..Selection::default() };
     let mut maps = formats::open(&arguments.file, &selection)?;
-    let time = maps.times().first().filter(|_| maps.times().len() > 1).map(|time| time.label.clone());
+    let several = table.dimensions.iter().any(|dimension| dimension.time && dimension.len > 1);
+    let time = maps.times().first().filter(|_| several).map(|time| time.label.clone());
     Ok((maps.values(0)?, time))
 }
 
@@ -138,6 +180,12 @@ fn unread(error: Error) -> Result<Unread, Error> {
         Error::BadNumber { place, text, .. } => Ok(Unread::NotAMap(format!("'{text}' in {place}"))),
         Error::NoValues { .. } => Ok(Unread::NotAMap("without values".to_owned())),
         Error::DimensionLeft { .. } => Ok(Unread::Select),
+        Error::NoSuchDimension { .. }
+        | Error::NoDimension { .. }
+        | Error::NoSuchPlace { .. }
+        | Error::SeveralPlaces { .. }
+        | Error::IndexRange { .. }
+        | Error::SphereDimension { .. } => Ok(Unread::Elsewhere(problem.to_string())),
         _ => Err(error),
     }
 }
@@ -178,13 +226,14 @@ fn write_text(out: &mut String, arguments: &Arguments, report: &Report<'_>) -> s
             "  {:>3} {:<20} {:<12} {:>13} {:>13} {:>13} {:>13} {:>8}",
             "no.", "field", "unit", "min", "max", "mean", "std. dev.", "masked"
         )?;
-        for (i, f) in fields.iter().enumerate() {
+        for f in fields {
             let unit = f.field.unit.as_deref().unwrap_or("-");
-            write!(out, "  {i:>3} {:<20} {unit:<12}", f.field.name)?;
+            write!(out, "  {:>3} {:<20} {unit:<12}", f.number, f.field.name)?;
             let Some(masked) = f.masked_fraction else {
-                match &f.not_a_map {
-                    Some(found) => writeln!(out, " is {found}, not a map of numbers")?,
-                    None => {
+                match (&f.not_a_map, &f.not_selected) {
+                    (Some(found), _) => writeln!(out, " is {found}, not a map of numbers")?,
+                    (_, Some(problem)) => writeln!(out, " {problem}")?,
+                    (None, None) => {
                         let select: Vec<_> = f.select.iter().map(|name| format!("--select {name}=VALUE")).collect();
                         writeln!(out, " needs {}", select.join(" "))?;
                     }

@@ -159,7 +159,7 @@ fn info_describes_grids_of_latitude_and_longitude() {
     let words: Vec<_> = text.lines().map(|l| l.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
     // Of the first time, from 3 to 11, of which three values are missing.
     assert!(words.iter().any(|l| l == "0 t K 3.000000 11.000000 7.000000 2.581989 25.000% (at 1997-12-01)"), "{text}");
-    assert!(words.iter().any(|l| l == "0 u - needs --select level=VALUE"), "{text}");
+    assert!(words.iter().any(|l| l == "1 u - needs --select level=VALUE"), "{text}");
 
     let report = json(&folder.done("info field.nc --format json"));
     let [t, u] = [0, 1].map(|i| &report["tables"][i]);

@@ -29,6 +29,7 @@ fn layout(nside: usize, ordering: Ordering, float32: bool, steps: usize) -> Netc
         ordering,
         float32,
         columns: vec![column("anisotropy", "1", "anisotropy of the contours"), column("V 1/2", "K m-1", "")],
+        numbers: vec![column("mean", "K", "mean of the input")],
         attributes: vec![
             card("TITLE", CardValue::Text("Größe".into())),
             card("HISTORY", CardValue::Text("longan map\nlonger".into())),
@@ -57,7 +58,11 @@ fn write(path: &Path, layout: &NetcdfLayout, steps: usize) -> Result<(), Error> 
         let mut writer = NetcdfWriter::create(path, layout.clone())?;
         for step in 0..steps {
             let columns = [0, 1].map(|c| (0..layout.grid.pixels()).map(|p| value(step, c, p)).collect::<Vec<_>>());
-            writer.append(&[&columns[0], &columns[1]], layout.time.is_some().then(|| time(step)).as_ref())?;
+            writer.append(
+                &[&columns[0], &columns[1]],
+                &[step as f64],
+                layout.time.is_some().then(|| time(step)).as_ref(),
+            )?;
         }
         writer.finish()
     })
@@ -132,6 +137,7 @@ fn the_header_is_as_documented() {
         ("time", "axis", "T"),
         ("anisotropy", "grid_mapping", "healpix"),
         ("V_1_2", "units", "K m-1"),
+        ("mean", "long_name", "mean of the input"),
     ] {
         assert_eq!(text(of(variable, name).unwrap()), expected);
     }
@@ -140,6 +146,8 @@ fn the_header_is_as_documented() {
     assert!(matches!(of("anisotropy", "_FillValue"), Some(netcdf::AttributeValue::Float(fill)) if fill.is_nan()));
     assert!(file.variable("healpix").unwrap().dimensions().is_empty());
     assert!(file.dimension("time").unwrap().is_unlimited());
+    let means: Vec<f64> = file.variable("mean").unwrap().get_values(..).unwrap();
+    assert_eq!(means, [0.0, 1.0]);
     let cells: Vec<i64> = file.variable("cell").unwrap().get_values(..).unwrap();
     assert!(cells.into_iter().eq(0..192));
     let stored: Vec<f32> = file.variable("anisotropy").unwrap().get_values((1, ..)).unwrap();
@@ -158,13 +166,16 @@ fn names_that_clash() {
     let names = ["time", "cell", "a/b", "a b", "2d", "", "µ", "healpix"];
     let column = |name: &&str| NetcdfColumn { name: (*name).into(), unit: String::new(), long_name: String::new() };
     layout.columns = names.iter().map(column).collect();
+    layout.numbers = vec![column(&"a b")];
     let values: Vec<Vec<f64>> = (0..names.len()).map(|c| vec![c as f64; 12]).collect();
     save(&path, false, |path| {
         let mut writer = NetcdfWriter::create(path, layout)?;
-        writer.append(&values.iter().map(Vec::as_slice).collect::<Vec<_>>(), None)?;
+        writer.append(&values.iter().map(Vec::as_slice).collect::<Vec<_>>(), &[2.5], None)?;
         writer.finish()
     })
     .unwrap();
+    let number = netcdf::open(&path).unwrap().variable("a_b__").unwrap().get_value::<f64, _>(()).unwrap();
+    assert_eq!(number, 2.5);
     for (number, name) in ["time_", "cell_", "a_b", "a_b_", "v2d", "v", "v_", "healpix_"].into_iter().enumerate() {
         assert_eq!(longan_formats::read(&path, &field(name)).unwrap().values(), values[number]);
     }
@@ -190,7 +201,7 @@ fn what_cannot_be_written() {
     let append = |steps: usize, columns: &[&[f64]], times: &[Option<Time>]| {
         let result = save(&path, false, |path| {
             let mut writer = NetcdfWriter::create(path, layout(1, Ordering::Ring, false, steps))?;
-            times.iter().try_for_each(|time| writer.append(columns, time.as_ref()))?;
+            times.iter().try_for_each(|time| writer.append(columns, &[0.0], time.as_ref()))?;
             writer.finish()
         });
         problem(result).0

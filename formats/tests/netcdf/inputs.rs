@@ -35,7 +35,6 @@ pub(crate) enum Data {
     U8(Vec<u8>),
     I16(Vec<i16>),
     U64(Vec<u64>),
-    I64(Vec<i64>),
     Text(Vec<&'static str>),
 }
 
@@ -108,7 +107,6 @@ impl Nc {
                 Data::U8(_) => file.add_variable::<u8>(path, dimensions),
                 Data::I16(_) => file.add_variable::<i16>(path, dimensions),
                 Data::U64(_) => file.add_variable::<u64>(path, dimensions),
-                Data::I64(_) => file.add_variable::<i64>(path, dimensions),
                 Data::Text(_) => file.add_variable_with_type(path, dimensions, &netcdf::types::NcVariableType::String),
             }
             .unwrap();
@@ -130,7 +128,6 @@ impl Nc {
                 Data::U8(values) => variable.put_values(values, extents),
                 Data::I16(values) => variable.put_values(values, extents),
                 Data::U64(values) => variable.put_values(values, extents),
-                Data::I64(values) => variable.put_values(values, extents),
                 Data::Text(values) => {
                     let put = |(i, value): (usize, &&str)| variable.put_string(value, [i]);
                     values.iter().enumerate().try_for_each(put)
