@@ -5,6 +5,10 @@
 #[allow(dead_code)]
 mod bytes;
 
+/// Every family of files, from end to end.
+mod families;
+/// Fields on grids of latitude and longitude, made by hand.
+mod gridded;
 /// `longan map` on one input.
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
@@ -15,6 +19,8 @@ mod refusals;
 mod reports;
 /// Several inputs, runs that go on where another ended, and runs that are killed.
 mod runs;
+/// Fields with steps in time, and files of them.
+mod steps;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -27,6 +33,7 @@ use tempfile::TempDir;
 
 use super::difference;
 use bytes::{Col, col, f64s, file};
+pub(crate) use gridded::Layout;
 
 /// A folder in which the program runs.
 pub(crate) struct Folder(TempDir);

@@ -62,6 +62,12 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
+/// Keeps HDF5 from printing its errors in this thread; for those who call libnetcdf by other ways.
+pub(crate) fn quiet() {
+    let _guard = sys::libnetcdf_lock.lock();
+    quieten();
+}
+
 /// Keeps HDF5 from printing its errors, of which libnetcdf tells. It has a printer for each thread.
 fn quieten() {
     if !QUIET.replace(true) {

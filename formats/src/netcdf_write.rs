@@ -11,6 +11,7 @@ use netcdf::{AttributeValue, Extent, FileMut, NcTypeDescriptor, VariableMut};
 use rayon::prelude::*;
 
 use crate::canvas::CHUNK;
+use crate::libnetcdf;
 use crate::{Card, CardValue, Error, Healpix, Ordering, Time};
 
 /// What the steps of a file have in common.
@@ -87,6 +88,7 @@ impl NetcdfWriter {
         let level = grid.depth().map_err(|_| Error::RefinementLevel { nside: grid.nside() })?;
         // libnetcdf takes some relative paths for addresses on the net.
         let path = std::path::absolute(path).map_err(Error::io("write it"))?;
+        libnetcdf::quiet();
         let file = netcdf::create(path).map_err(refused("create it"))?;
         let mut names = names(layout.columns.iter().chain(&layout.numbers));
         let numbers = names.split_off(layout.columns.len());

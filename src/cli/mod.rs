@@ -34,7 +34,7 @@ Examples:
   longan map sims/*.fits -o maps/        many maps, one output each
   longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
-  longan regrid stations.csv -o rain.fits --variable rain
+  longan regrid stations.csv -o rainfall.fits --variable rain
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
 Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]

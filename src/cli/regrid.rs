@@ -20,7 +20,7 @@ use super::sink::{self, Kind, MapColumn, OutputOptions, Step, Table};
 Examples:
   longan regrid era5.nc -o z500.nc --variable z --select level=500
   longan regrid era5.nc -o z500.fits --variable z --select level=500 --nside 64 --method bilinear
-  longan regrid stations.csv -o rain.fits --variable rain --nside 32 --reach 10
+  longan regrid stations.csv -o rainfall.fits --variable rain --nside 32 --reach 10
   longan regrid sky.fits -o sky.nc")]
 pub(crate) struct Arguments {
     /// File of a map: FITS, NetCDF, Zarr, CSV, PLY.
