@@ -140,8 +140,8 @@ fn one_field_in_every_layout_of_latitudes_and_longitudes() {
     }
 }
 
-/// The largest difference of W1 and |ψ2| between the field's Minkowski maps from a grid of latitudes and longitudes and
-/// from HEALPix directly, relative to the largest W1.
+/// The mean difference of W1 and |ψ2| between the field's Minkowski maps from a grid of latitudes and longitudes and from
+/// HEALPix directly, relative to the mean W1.
 fn error(spacing: f64, nside: usize, method: &str) -> f64 {
     let folder = Folder::new();
     Layout::of(spacing).write(&folder.path("grid.nc"), |_, latitude, longitude| smooth(latitude, longitude));
@@ -149,21 +149,23 @@ fn error(spacing: f64, nside: usize, method: &str) -> f64 {
     folder.done(&format!("map direct.fits -o a.fits {OPTIONS}"));
     folder.done(&format!("map grid.nc -o b.fits --nside {nside} --method {method} {OPTIONS}"));
     let [a, b] = ["a.fits", "b.fits"].map(|name| ["W1", "PSI2"].map(|field| folder.read(name, field)));
-    let scale = a[0].values().iter().copied().fold(0.0, f64::max);
-    (0..2).map(|i| difference(a[i].values(), b[i].values())).fold(0.0, f64::max) / scale
+    let apart = |i: usize| a[i].values().iter().zip(b[i].values()).map(|(a, b)| (a - b).abs()).sum::<f64>();
+    apart(0).max(apart(1)) / a[0].values().iter().sum::<f64>()
 }
 
 #[test]
 fn a_field_of_latitude_and_longitude_against_its_samples_on_healpix() {
-    // Interpolation is of second order in the spacing of the grid; means over cells and pixels in that of both grids.
-    for (method, sizes) in
-        [("bilinear", [(8.0, 32), (4.0, 32), (2.0, 32)]), ("conservative", [(8.0, 8), (4.0, 16), (2.0, 32)])]
-    {
+    // Interpolation is of second order in the spacing of the grid. Cells are taken as constant for overlaps, which is of
+    // first order, where pixels are not much larger than cells. Contours that move into other windows with their pixels
+    // leave some noise. At a spacing of 2 degrees, 1/30 of the field's scale of a radian, orders two and one are 1e-3
+    // and, as errors of cells cancel within a window of hundreds, less than a tenth of 3e-2.
+    for (method, sizes, ratio, most) in [
+        ("bilinear", [(8.0, 32), (4.0, 32), (2.0, 32)], 0.4, 1e-3),
+        ("conservative", [(8.0, 8), (4.0, 16), (2.0, 32)], 0.7, 3e-3),
+    ] {
         let errors = sizes.map(|(spacing, nside)| error(spacing, nside, method));
-        // Second order is a fourth; pixels of contours that come and go leave some noise.
-        assert!(errors[1] < 0.4 * errors[0] && errors[2] < 0.4 * errors[1], "{method}: {errors:?}");
-        // A spacing of 2 degrees is 1/30 of the field's scale of a radian, so 1e-3 in second order.
-        assert!(errors[2] < 5e-3, "{method}: {errors:?}");
+        assert!(errors[1] < ratio * errors[0] && errors[2] < ratio * errors[1], "{method}: {errors:?}");
+        assert!(errors[2] < most, "{method}: {errors:?}");
     }
 }
 
@@ -233,19 +235,19 @@ fn masks_of_any_format() {
 #[test]
 fn regional_grids_are_masked_elsewhere() {
     let folder = Folder::new();
-    let inside = |latitude: f64, longitude: f64| latitude.abs() < 40.0 && (longitude - 180.0).abs() < 80.0;
+    let inside = |latitude: f64, longitude: f64| latitude.abs() < 38.0 && (longitude - 180.0).abs() < 80.0;
     // Global, with missing values; and a file of the region alone.
     let field = |_: usize, a: f64, b: f64| if inside(a, b) { smooth(a, b) } else { f64::NAN };
     Layout::of(4.0).write(&folder.path("global.nc"), field);
-    let latitudes: Vec<f64> = (0..20).map(|i| -38.0 + 4.0 * f64::from(i)).collect();
+    let latitudes: Vec<f64> = (0..19).map(|i| -36.0 + 4.0 * f64::from(i)).collect();
     let longitudes: Vec<f64> = (0..40).map(|i| 102.0 + 4.0 * f64::from(i)).collect();
     let values: Vec<f64> = latitudes.iter().flat_map(|&a| longitudes.iter().map(move |&b| smooth(a, b))).collect();
     zarr(
         &folder.path("region.zarr"),
         2,
         &[
-            ("t", &[20, 40], &values, json!({}), &["y", "x"]),
-            ("y", &[20], &latitudes, json!({"standard_name": "latitude", "units": "degrees_north"}), &["y"]),
+            ("t", &[19, 40], &values, json!({}), &["y", "x"]),
+            ("y", &[19], &latitudes, json!({"standard_name": "latitude", "units": "degrees_north"}), &["y"]),
             ("x", &[40], &longitudes, json!({"axis": "X", "units": "degrees_east"}), &["x"]),
         ],
     );
@@ -265,7 +267,7 @@ fn regional_grids_are_masked_elsewhere() {
         for (p, value) in map.values().iter().enumerate() {
             let (theta, phi) = map.grid().centre(p);
             let (latitude, longitude) = (90.0 - theta.to_degrees(), phi.to_degrees());
-            let (north, east) = (40.0 - latitude.abs(), 80.0 - (longitude - 180.0).abs());
+            let (north, east) = (38.0 - latitude.abs(), 80.0 - (longitude - 180.0).abs());
             // Windows wholly inside have values, those wholly outside have none.
             if north > 20.0 && east * latitude.to_radians().cos() > 20.0 {
                 assert!(value.is_finite(), "{latitude} {longitude}");
@@ -275,7 +277,8 @@ fn regional_grids_are_masked_elsewhere() {
         }
         assert!(folder.done(&format!("totals {input}")).contains("masked: "));
     }
-    assert!(difference(maps[0].values(), maps[1].values()) < 1e-12);
+    let apart = difference(maps[0].values(), maps[1].values());
+    assert!(apart < 1e-12, "{apart}");
 }
 
 #[test]
@@ -300,9 +303,9 @@ fn files_that_are_broken() {
     let values = vec![1.0; 18];
     let store = |name: &str, latitudes: [f64; 3], latitude: serde_json::Value, fields: &[&str]| {
         let mut arrays: Vec<super::gridded::Array<'_>> =
-            fields.iter().map(|name| (*name, &[3, 6][..], &values[..], json!({}), &["y", "x"][..])).collect();
-        arrays.push(("y", &[3], &latitudes, latitude, &["y"]));
-        arrays.push(("x", &[6], &[0.0, 60.0, 120.0, 180.0, 240.0, 300.0], axis("longitude", "degrees_east"), &["x"]));
+            fields.iter().map(|name| (*name, &[3, 6][..], &values[..], json!({}), &["j", "i"][..])).collect();
+        arrays.push(("j", &[3], &latitudes, latitude, &["j"]));
+        arrays.push(("i", &[6], &[0.0, 60.0, 120.0, 180.0, 240.0, 300.0], axis("longitude", "degrees_east"), &["i"]));
         zarr(&folder.path(name), 2, &arrays);
     };
     let [up, mixed] = [[-60.0, 0.0, 60.0], [-60.0, 60.0, 0.0]];
@@ -327,7 +330,7 @@ fn files_that_are_broken() {
         ("json.zarr", &["Zarr store"]),
         ("rows.csv", &["line 3", "2 values", "3 columns"]),
         ("words.csv", &["line 3", "'north'"]),
-        ("columns.csv", &["lon,lat"]),
+        ("columns.csv", &["lon, lat"]),
         ("face.ply", &["header"]),
         ("folder", &["neither a file nor a Zarr store"]),
     ];

@@ -159,7 +159,8 @@ pub(crate) fn zarr(path: &Path, version: u8, arrays: &[Array<'_>]) {
             fs::write(path.join(name).join(if origin.is_empty() { "0".to_owned() } else { origin.join(".") }), bytes)
                 .unwrap();
         } else {
-            let chunk = path.join(name).join("c").join(origin.join("/"));
+            let key = [&["c"], &origin[..]].concat().join("/");
+            let chunk = path.join(name).join(key);
             fs::create_dir_all(chunk.parent().unwrap()).unwrap();
             write(
                 &format!("{name}/zarr.json"),

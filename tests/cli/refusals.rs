@@ -18,7 +18,7 @@ fn files_that_are_no_maps() {
     let files: [(&str, Vec<u8>, &[&str]); 27] = [
         ("empty.fits", vec![], &["an empty file"]),
         ("text.fits", b"longitude latitude value\n".to_vec(), &["a text file", "convert it first"]),
-        ("table.fits", b"longitude,latitude,value\n".to_vec(), &["no column of numbers", "--variable"]),
+        ("table.fits", b"longitude,latitude,value\n".to_vec(), &["column", "--variable"]),
         ("png.fits", b"\x89PNG\r\n\x1a\n\0\0".to_vec(), &["a PNG picture"]),
         ("hdf5.fits", b"\x89HDF\r\n\x1a\n\0\0".to_vec(), &["the NetCDF library says"]),
         ("netcdf.fits", b"CDF\x01\0\0\0".to_vec(), &["the NetCDF header is damaged"]),
