@@ -138,7 +138,7 @@ fn block(
 ) -> Option<(usize, Range<usize>)> {
     let along = ranges.iter().zip(chunks).position(|(range, &chunk)| range.len() == 1 && chunk > 1)?;
     let one = ranges.iter().try_fold(1usize, |product, range| product.checked_mul(range.len()))?;
-    let most = if one == 0 { 0 } else { most / one };
+    let most = most.checked_div(one).unwrap_or(0);
     let (step, chunk) = (ranges[along].start, chunks[along]);
     let steps = most.min(chunk);
     let first = step - step % chunk;

@@ -51,7 +51,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LIST", default_value = "evq")]
     measure: Measures,
     /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside. Several, such as
-    /// 4,6,10, make an extension each.
+    /// 4,6,10, make an extension each, in NetCDF variables such as EVQ_WINDOW_4.
     #[arg(long, value_name = "DEG,...", default_value = "6", value_delimiter = ',')]
     #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
     window: Vec<f64>,
@@ -61,7 +61,8 @@ pub(crate) struct Arguments {
     /// Weight of the contour's pieces in tensors: their length (W_1) or their curvature (W_2).
     #[arg(long, value_name = "WEIGHT", default_value = "length")]
     weight: WeightOption,
-    /// Write one extension for each threshold instead of the mean over thresholds.
+    /// Write one extension, in NetCDF variables such as EVQ_THRESHOLD_1, for each threshold instead of the mean over
+    /// thresholds.
     #[arg(long)]
     sequence: bool,
     /// Windows with a larger share of masked cells than this, from 0 to 1, are masked.

@@ -122,7 +122,6 @@ impl Provenance<'_> {
                 _ if of_thresholds && (sequence || self.of_the_step()) => continue,
                 "WINDOW" if windows.len() > 1 => text("WINDOW", windows.join(", "), ""),
                 "PSIERROR" => real("PSIERROR", maps.iter().map(|m| m.ways.error).fold(0.0, f64::max), ""),
-                _ if matches!(&card.value, CardValue::Text(text) if text.is_empty()) => continue,
                 "COMMAND" => text("HISTORY", self.command.clone(), ""),
                 _ => card,
             });

@@ -220,6 +220,7 @@ fn netcdf_layout(layout: Layout, first: &mut Step) -> NetcdfLayout {
     if let Some(coordinates) = layout.coordinates {
         attributes.push(text("coordsys", format!("{coordinates:?}").to_lowercase(), ""));
     }
+    attributes.retain(|card| !matches!(&card.value, CardValue::Text(text) if text.is_empty()));
     let axis = |time: &Time| TimeAxis { units: time.units.clone(), calendar: time.calendar.clone() };
     NetcdfLayout {
         grid: layout.grid,

@@ -300,7 +300,7 @@ fn files_that_are_broken() {
         }
     }
     let axis = |name: &str, unit: &str| json!({"standard_name": name, "units": unit});
-    let values = vec![1.0; 18];
+    let values = [1.0; 18];
     let store = |name: &str, latitudes: [f64; 3], latitude: serde_json::Value, fields: &[&str]| {
         let mut arrays: Vec<super::gridded::Array<'_>> =
             fields.iter().map(|name| (*name, &[3, 6][..], &values[..], json!({}), &["j", "i"][..])).collect();
