@@ -141,6 +141,14 @@ impl Folder {
     }
 }
 
+/// Frees a NetCDF file that was just written here from HDF5's lock on it, which lasts a while longer where another test
+/// starts a program at this moment: that inherits the open file.
+fn unlock(path: &Path) {
+    let bytes = std::fs::read(path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    std::fs::write(path, bytes).unwrap();
+}
+
 fn ran(mut command: Command) -> Ran {
     let output = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap();

@@ -127,6 +127,7 @@ impl Layout {
             }
         }
         file.close().unwrap();
+        super::unlock(path);
     }
 }
 

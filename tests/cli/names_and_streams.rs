@@ -168,6 +168,7 @@ fn netcdf_with_levels(path: &Path) {
     let values: Vec<f64> = (0..96).map(|n| f64::from(n * 7 % 13)).collect();
     file.add_variable::<f64>("z", &["time", "level", "lat", "lon"]).unwrap().put_values(&values, ..).unwrap();
     file.close().unwrap();
+    unlock(path);
 }
 
 #[test]

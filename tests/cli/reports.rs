@@ -138,6 +138,7 @@ fn netcdf_file(path: &std::path::Path) {
     field.put_values(&values, ..).unwrap();
     file.add_variable::<f32>("u", &["level", "lat", "lon"]).unwrap();
     file.close().unwrap();
+    unlock(path);
 }
 
 #[test]
