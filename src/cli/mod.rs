@@ -6,12 +6,15 @@
 
 mod demo;
 mod info;
+mod input;
 mod map;
 mod measures;
 mod options;
 mod output;
 mod progress;
+mod regrid;
 mod simulate;
+mod sink;
 mod totals;
 
 use std::io::Write;
@@ -19,7 +22,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// Shape on the sphere: Minkowski functionals and tensors of HEALPix maps, in moving windows.
+/// Shape on the sphere: Minkowski functionals and tensors of maps and other fields, in moving windows.
+///
+/// Reads HEALPix in FITS, NetCDF and Zarr, latitude-longitude grids in NetCDF and Zarr, points in CSV, surfaces in PLY.
 #[derive(Parser)]
 #[command(version, arg_required_else_help = true, subcommand_required = true, propagate_version = true)]
 #[command(after_help = "\
@@ -28,7 +33,9 @@ Examples:
   longan info sky.fits                   what a file holds
   longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
   longan map sims/*.fits -o maps/        many maps, one output each
+  longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
+  longan regrid stations.csv -o rainfall.fits --variable rain
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
 Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]
@@ -42,6 +49,7 @@ enum Command {
     Map(map::Arguments),
     Totals(totals::Arguments),
     Info(info::Arguments),
+    Regrid(regrid::Arguments),
     Measures(measures::Arguments),
     Simulate(simulate::Arguments),
     Demo(demo::Arguments),
@@ -55,6 +63,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Map(arguments) => map::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
