@@ -17,7 +17,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::contour::Field;
-use crate::moments::{self, Layout, RingMoments, SHARES, Selection};
+use crate::moments::{self, Layout, RingMoments, SHARES, Selection, Weight};
 use prefix::Way;
 use reach::{OutputRing, Reached};
 
@@ -334,7 +334,11 @@ fn visited(
         moments.curvature = selected(layout.curvature);
         moments.psi.clear();
         let rows = (layout.first_rank..layout.rows).step_by(2);
-        moments.psi.extend(rows.map(|row| Complex64::new(mean(row), mean(row + 1))));
+        // |ψ_s| ≤ W1, which the error of prefix sums must not break where a contour is nearly straight.
+        let most =
+            if layout.weight == Weight::Length && layout.length.is_some() { moments.length } else { f64::INFINITY };
+        let bounded = |psi: Complex64| if psi.norm() > most { psi * (most / psi.norm()) } else { psi };
+        moments.psi.extend(rows.map(|row| bounded(Complex64::new(mean(row), mean(row + 1)))));
         visit(&moments, out);
     }
     out
