@@ -3,19 +3,21 @@
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use longan::formats::{self, Healpix, Map, Ordering};
-use longan::measures::{BuiltIn, Measure, find};
+use longan::measures::{CatalogueError, Measure, find, split};
 use longan::statistics::statistics;
 use longan::window::{Summation, Ways};
 use longan::{Analysis, MinkowskiMaps, Weight};
 
+use super::misused;
 use super::options::{BodyOptions, Input, Running, between, check_memory, decimals, nside, shown};
 use super::output::Provenance;
+use super::plugin::Plugins;
 use super::progress::Progress;
 
 /// Minkowski map of a HEALPix map: measures of shape in windows about the pixels of a coarser grid.
@@ -27,6 +29,7 @@ use super::progress::Progress;
 Examples:
   longan map sky.fits -o evq.fits
   longan map sky.fits -o out.fits --measure evq,evq-direction,psi4,rank4-mid --mask mask.fits
+  longan map sky.fits -o out.fits --measure 'beta = (w1 - psi2)/(w1 + psi2)' --measure evq
   longan map sky.fits -o out.fits --thresholds -100,0,100 --sequence
   longan map rain.fits -o out.fits --thresholds log:0.1:100:7 --window 4 --nside-out 64
   longan map sky.fits -o out.fits --nside-out 512 --window 4,6,10 --verbose
@@ -40,9 +43,13 @@ pub(crate) struct Arguments {
     /// File to write; for several inputs a folder, which gets a file of the same name for each.
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
-    /// Measures, separated by commas, such as evq,psi2-direction; `longan measures` explains them all.
-    #[arg(long, value_name = "LIST", default_value = "evq")]
-    measure: Measures,
+    /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
+    /// "beta = (w1 - psi2)/(w1 + psi2)"; may be repeated. `longan measures` lists all measures, and
+    /// `longan measures --help` explains formulas [default: evq].
+    #[arg(long, value_name = "LIST")]
+    measure: Vec<String>,
+    #[command(flatten)]
+    plugins: Plugins,
     /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside. Several, such as
     /// 4,6,10, make an extension each.
     #[arg(long, value_name = "DEG,...", default_value = "6", value_delimiter = ',')]
@@ -92,31 +99,8 @@ pub(crate) struct Arguments {
     verbose: bool,
 }
 
-/// Measures, no two the same.
-#[derive(Clone, Debug)]
-struct Measures(Vec<BuiltIn>);
-
 /// Columns that a FITS table can have.
 const COLUMNS_MAX: usize = 999;
-
-impl FromStr for Measures {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut measures: Vec<BuiltIn> = Vec::new();
-        for name in text.split(',') {
-            let measure = find(name.trim()).map_err(|e| e.to_string())?;
-            if measures.iter().any(|other| other.name() == measure.name()) {
-                return Err(format!("'{}' is given twice", measure.name()));
-            }
-            measures.push(measure);
-        }
-        if measures.len() > COLUMNS_MAX {
-            return Err(format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len()));
-        }
-        Ok(Measures(measures))
-    }
-}
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum WeightOption {
@@ -133,11 +117,12 @@ enum OrderingOption {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
+    let measures = arguments.measures()?;
     let jobs = arguments.jobs()?;
     let mask = arguments.input.read_mask()?;
     let mut failed = Vec::new();
     for (input, output) in &jobs {
-        if let Err(error) = arguments.one(input, output, mask.as_ref()) {
+        if let Err(error) = arguments.one(input, output, mask.as_ref(), &measures) {
             if jobs.len() == 1 {
                 return Err(error);
             }
@@ -155,6 +140,36 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
+    /// The measures asked for, no two the same.
+    fn measures(&self) -> anyhow::Result<Vec<Arc<dyn Measure>>> {
+        let catalogue = self.plugins.catalogue()?;
+        let wrong = |text: &str, problem: String| {
+            misused("map", format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
+        };
+        let mut measures: Vec<Arc<dyn Measure>> = Vec::new();
+        for text in self.measure.iter().flat_map(|list| split(list)) {
+            let measure = catalogue.find(text).map_err(|e| match &e {
+                CatalogueError::Formula(formula) => wrong(text, format!("{e}\n\n{}", formula.marked())),
+                _ => wrong(text, e.to_string()),
+            })?;
+            if let Some(other) = measures.iter().find(|other| other.column().eq_ignore_ascii_case(&measure.column())) {
+                let [one, other] = [measure.name(), other.name()];
+                let twice = if one == other { "is given twice".into() } else { format!("has the column of '{other}'") };
+                return Err(wrong(text, format!("'{one}' {twice}")));
+            }
+            measures.push(measure);
+        }
+        if measures.len() > COLUMNS_MAX {
+            let problem =
+                format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len());
+            return Err(misused("map", problem));
+        }
+        if measures.is_empty() {
+            measures.push(Arc::new(find("evq")?));
+        }
+        Ok(measures)
+    }
+
     /// Inputs and their outputs, those that are finished left out, after all checks that need no reading.
     fn jobs(&self) -> anyhow::Result<Vec<(&Path, PathBuf)>> {
         let out = &self.output;
@@ -217,14 +232,13 @@ impl Arguments {
         }
     }
 
-    fn one(&self, path: &Path, output: &Path, mask: Option<&Map>) -> anyhow::Result<()> {
+    fn one(&self, path: &Path, output: &Path, mask: Option<&Map>, measures: &[Arc<dyn Measure>]) -> anyhow::Result<()> {
         let start = Instant::now();
         let map = self.input.read(path, mask)?;
         let analysis = self.analysis();
         let about = || shown(path);
         let grid = analysis.check(map.grid()).with_context(about)?;
         let ordering = self.ordering_for(&map, grid).with_context(about)?;
-        let measures = &self.measure.0;
         let extensions = analysis.windows.len() * if self.sequence { analysis.thresholds.values().len() } else { 1 };
         check_memory(grid, extensions * measures.len()).with_context(about)?;
         let progress = Progress::new(about(), self.running.quiet);
@@ -238,7 +252,7 @@ impl Arguments {
         if self.verbose {
             maps.iter().try_for_each(|maps| self.running.say(explained(maps)))?;
         }
-        let summary = self.summary(&maps[0].values[0], maps[0].grid);
+        let summary = summary(&measures[0].column(), &maps[0].values[0], maps[0].grid);
         let provenance =
             Provenance { path, map: &map, input: &self.input, analysis: &analysis, command: self.command(path) };
         let file = provenance.file(maps, measures, ordering, self.float32);
@@ -258,15 +272,6 @@ impl Arguments {
         Ok(ordering)
     }
 
-    /// What the first column holds, in a few words.
-    fn summary(&self, values: &[f64], grid: Healpix) -> String {
-        let all = format!("{} of Nside {}", self.measure.0[0].column(), grid.nside());
-        let Some(s) = statistics(values) else { return format!("{all} is masked or undefined everywhere") };
-        let [min, max, mean] = [s.min, s.max, s.mean].map(|x| decimals(x, 4));
-        let (without, pixels) = (values.len() - s.unmasked, values.len());
-        format!("{all} from {min} to {max}, mean {mean}, {without} of {pixels} pixels masked or undefined")
-    }
-
     /// The command that makes this output: as given, with this input only.
     fn command(&self, input: &Path) -> String {
         let others: HashSet<_> = self.inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
@@ -277,6 +282,15 @@ impl Arguments {
         let quoted = shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_else(|_| words.join(" "));
         format!("longan {quoted}")
     }
+}
+
+/// What the first column holds, in a few words.
+fn summary(column: &str, values: &[f64], grid: Healpix) -> String {
+    let all = format!("{column} of Nside {}", grid.nside());
+    let Some(s) = statistics(values) else { return format!("{all} is masked or undefined everywhere") };
+    let [min, max, mean] = [s.min, s.max, s.mean].map(|x| decimals(x, 4));
+    let (without, pixels) = (values.len() - s.unmasked, values.len());
+    format!("{all} from {min} to {max}, mean {mean}, {without} of {pixels} pixels masked or undefined")
 }
 
 /// How the windows of a map were summed, and why.

@@ -9,6 +9,7 @@ mod map;
 mod measures;
 mod options;
 mod output;
+mod plugin;
 mod progress;
 mod simulate;
 mod totals;
@@ -16,7 +17,8 @@ mod totals;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Shape on the sphere: Minkowski functionals and tensors of HEALPix maps, in moving windows.
 #[derive(Parser)]
@@ -42,6 +44,7 @@ enum Command {
     Totals(totals::Arguments),
     Info(info::Arguments),
     Measures(measures::Arguments),
+    Plugin(plugin::Arguments),
     Simulate(simulate::Arguments),
     Demo(demo::Arguments),
 }
@@ -53,14 +56,29 @@ pub(crate) fn main() -> ExitCode {
         Command::Totals(arguments) => totals::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),
+        Command::Plugin(arguments) => plugin::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            let _ = writeln!(std::io::stderr(), "longan: {e:#}");
-            ExitCode::FAILURE
-        }
+        Err(e) => match e.downcast::<clap::Error>() {
+            Ok(misused) => {
+                let _ = misused.print();
+                ExitCode::from(2)
+            }
+            Err(e) => {
+                let _ = writeln!(std::io::stderr(), "longan: {e:#}");
+                ExitCode::FAILURE
+            }
+        },
     }
+}
+
+/// What clap says about an argument, for one that only makes sense together with others.
+fn misused(command: &str, problem: String) -> anyhow::Error {
+    let mut arguments = Arguments::command();
+    arguments.build();
+    let command = arguments.find_subcommand_mut(command).expect("a command of this program");
+    command.error(ErrorKind::ValueValidation, problem).into()
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use longan::formats::{Card, CardValue, Column, CoordinateSystem, Extension, HealpixFile, Map, Ordering};
-use longan::measures::Measure;
+use longan::measures::{Measure, Origin};
 use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
 
 use super::options::Input;
@@ -47,12 +47,35 @@ pub(crate) fn creator() -> Card {
     text("CREATOR", concat!("longan ", env!("CARGO_PKG_VERSION")), "program that wrote this file")
 }
 
+/// Formulas and plugins that measures come from.
+fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
+    let (mut formulas, mut plugins) = (Vec::new(), Vec::new());
+    for measure in measures {
+        match measure.as_ref().origin() {
+            Origin::Formula(formula) => formulas.push(formula),
+            Origin::Plugin(plugin) if !plugins.contains(&plugin) => plugins.push(plugin),
+            Origin::Plugin(_) | Origin::Program => (),
+        }
+    }
+    let formulas =
+        (1..).zip(formulas).map(|(n, text)| self::text(&numbered("FORMULA", n), text, "formula of a column"));
+    let plugins = (1..).zip(plugins).map(|(n, text)| self::text(&numbered("PLUGIN", n), text, "plugin of measures"));
+    formulas.chain(plugins).collect()
+}
+
+/// A keyword with a number, within the eight characters of FITS: FORMULA1 to FORMULA9, FORMUL10 and so on.
+fn numbered(keyword: &str, number: usize) -> String {
+    let number = number.to_string();
+    let room = 8usize.saturating_sub(number.len()).min(keyword.len());
+    format!("{}{number}", &keyword[..room])
+}
+
 impl Provenance<'_> {
     /// A file of these maps, one extension each.
     pub(crate) fn file(
         &self,
         maps: Vec<MinkowskiMaps>,
-        measures: &[impl Measure],
+        measures: &[impl AsRef<dyn Measure>],
         ordering: Ordering,
         float32: bool,
     ) -> HealpixFile {
@@ -67,8 +90,8 @@ impl Provenance<'_> {
         let grid = maps[0].grid;
         let extensions = maps.into_iter().enumerate().map(|(i, maps)| {
             let name = name(i, maps.window);
-            let cards = self.cards(&maps);
-            let columns = measures.iter().zip(maps.values);
+            let cards = [self.cards(&maps), origins(measures)].concat();
+            let columns = measures.iter().map(AsRef::as_ref).zip(maps.values);
             Extension {
                 name,
                 cards,
