@@ -5,10 +5,19 @@
 #[allow(dead_code)]
 mod bytes;
 
+/// Libraries from C.
+#[path = "../measures/tests/plugins/compile.rs"]
+#[allow(dead_code)]
+mod compile;
+
+/// Measures as formulas.
+mod formulas;
 /// `longan map` on one input.
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
 mod names_and_streams;
+/// Measures from libraries, and `longan plugin`.
+mod plugins;
 /// What is refused, and in which words.
 mod refusals;
 /// `totals`, `info`, `measures`, `simulate` and `demo`.
@@ -67,6 +76,11 @@ impl Folder {
         names
     }
 
+    /// The path of the folder.
+    fn root(&self) -> &Path {
+        self.0.path()
+    }
+
     /// The program, in this folder, with words as a shell would split them.
     fn command(&self, words: &str) -> Command {
         self.command_of(&shlex::split(words).expect("quotes that match"))
@@ -75,6 +89,7 @@ impl Folder {
     fn command_of(&self, words: &[impl AsRef<std::ffi::OsStr>]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_longan"));
         command.args(words).current_dir(self.0.path()).stdin(Stdio::null());
+        command.env_remove("LONGAN_PLUGIN_PATH");
         command
     }
 

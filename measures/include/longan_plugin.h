@@ -6,7 +6,6 @@
 #ifndef LONGAN_PLUGIN_H
 #define LONGAN_PLUGIN_H
 
-
 #include <stddef.h>
 #include <stdint.h>
 
