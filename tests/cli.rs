@@ -168,7 +168,8 @@ fn headers(fits: &[u8]) -> Vec<BTreeMap<String, String>> {
             if card.starts_with("END ") {
                 break;
             }
-            let Some((key, value)) = card.split_once("= ").or(card.split_once("CONTINUE")) else { continue };
+            let separator = if card.starts_with("CONTINUE") { "CONTINUE" } else { "= " };
+            let Some((key, value)) = card.split_once(separator) else { continue };
             let value = match value.trim().strip_prefix('\'') {
                 Some(text) => text.rsplit_once('\'').unwrap().0.replace("''", "'").trim_end().to_owned(),
                 None => value.split('/').next().unwrap().trim().to_owned(),

@@ -71,7 +71,13 @@ fn the_examples_are_the_built_in_bit_for_bit() {
     let [rust, ..] = in_rust();
     let plugins = format!("--plugin {} --plugin {}", quoted(&in_c(&folder, &[])), quoted(&rust));
     let measures = "--measure evq,example:quotient,example-c:quotient,beta,shape-index,psi3,w0";
-    for options in ["", "--mask mask.fits --window 20", "--window 0", "--nside-out 32 --threads 3", "--sequence"] {
+    for options in [
+        "",
+        "--mask mask.fits --window 20",
+        "--window 0",
+        "--nside-out 32 --threads 3",
+        "--sequence --thresholds=-1,0,1",
+    ] {
         folder.done(&format!("map sky.fits other.fits -o maps --overwrite {plugins} {measures} {options}"));
         for (name, hdu) in
             [("maps/sky.fits", 1), ("maps/other.fits", 1), ("maps/sky.fits", folder.headers("maps/sky.fits").len())]
