@@ -4,6 +4,8 @@
 //! `longan map sky.fits -o out.fits --plugin target/release/liblongan_example_plugin.so --measure shape-index`.
 //! `longan plugin new NAME` writes a crate of one's own to start from.
 
+#![forbid(unsafe_code)]
+
 use longan_plugin::{Measure, Needs, Window};
 
 /// An eigenvalue that is less than this share of the other is taken as 0.

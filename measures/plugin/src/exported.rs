@@ -122,7 +122,10 @@ impl Exported {
 
 /// A text that stays for ever.
 fn text(text: String) -> Result<*const c_char, String> {
-    let text = CString::new(text).map_err(|e| format!("the text {:?} has a zero within", e.into_vec()))?;
+    let text = CString::new(text).map_err(|e| {
+        let text = String::from_utf8_lossy(&e.into_vec()).into_owned();
+        format!("the text {text:?} has a zero within")
+    })?;
     Ok(text.into_raw())
 }
 

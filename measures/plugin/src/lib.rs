@@ -53,14 +53,14 @@ pub use num_complex::Complex64;
 #[doc(hidden)]
 pub use exported::{Exported, Message, Text};
 #[doc(hidden)]
-pub use longan_measures::plugin::interface::LonganPlugin;
+pub use longan_measures::plugin::interface::{self, LonganPlugin};
 
 /// Exports measures from a library as a plugin: its name, then the measures.
 ///
 /// The name is a lower-case letter followed by lower-case letters, digits and hyphens. It stands before that of a
 /// measure, `shares:share`, where the latter alone is ambiguous.
 ///
-/// ```ignore
+/// ```text
 /// longan_plugin::export!("shares": Share, Other { rank: 3 });
 /// ```
 #[macro_export]
