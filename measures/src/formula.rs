@@ -24,8 +24,15 @@ const BLANKS: [char; 4] = [' ', '\t', '\r', '\n'];
 /// Names offered in place of a wrong one, at most.
 const OFFERED: usize = 3;
 
+/// Something with its name.
+type Named<T> = (&'static str, T);
+
+type OfOne = fn(f64) -> f64;
+
+type OfTwo = fn(f64, f64) -> f64;
+
 /// Functions of one number. Angles are in radians.
-const FUNCTIONS: &[(&str, fn(f64) -> f64)] = &[
+const FUNCTIONS: &[Named<OfOne>] = &[
     ("abs", |x| finite(x.abs())),
     ("acos", |x| finite(x.acos())),
     ("asin", |x| finite(x.asin())),
@@ -50,14 +57,14 @@ const FUNCTIONS: &[(&str, fn(f64) -> f64)] = &[
 ];
 
 /// Functions of two numbers.
-const FUNCTIONS_OF_TWO: &[(&str, fn(f64, f64) -> f64)] = &[
+const FUNCTIONS_OF_TWO: &[Named<OfTwo>] = &[
     ("atan2", |y, x| both(y, x, f64::atan2)),
     ("hypot", |x, y| both(x, y, f64::hypot)),
     ("max", |x, y| both(x, y, f64::max)),
     ("min", |x, y| both(x, y, f64::min)),
 ];
 
-const OPERATORS: &[(&str, fn(f64, f64) -> f64)] = &[
+const OPERATORS: &[Named<OfTwo>] = &[
     ("+", |x, y| finite(x + y)),
     ("-", |x, y| finite(x - y)),
     ("*", |x, y| finite(x * y)),
@@ -65,7 +72,7 @@ const OPERATORS: &[(&str, fn(f64, f64) -> f64)] = &[
     ("^", |x, y| both(x, y, f64::powf)),
 ];
 
-const CONSTANTS: &[(&str, f64)] =
+const CONSTANTS: &[Named<f64>] =
     &[("e", std::f64::consts::E), ("pi", std::f64::consts::PI), ("tau", std::f64::consts::TAU)];
 
 /// The number, or NaN: what is not finite must not come back as a number later.
@@ -74,7 +81,7 @@ fn finite(x: f64) -> f64 {
 }
 
 /// The same of a function that may make a number of NaN, as 0 of NaN^0.
-fn both(x: f64, y: f64, of: fn(f64, f64) -> f64) -> f64 {
+fn both(x: f64, y: f64, of: OfTwo) -> f64 {
     if x.is_nan() || y.is_nan() { f64::NAN } else { finite(of(x, y)) }
 }
 

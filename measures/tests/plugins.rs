@@ -250,7 +250,7 @@ fn folders_are_searched_but_never_the_working_one() {
     let list = |folders: &[&Path]| in_folders(&std::env::join_paths(folders).unwrap());
     assert_eq!(list(&[libraries.0.path()]).unwrap(), [first.clone(), second.clone()]);
     assert_eq!(list(&[Path::new(""), libraries.0.path(), Path::new("")]).unwrap(), [first, second]);
-    assert_eq!(in_folders("".as_ref()).unwrap(), [PathBuf::new(); 0]);
+    assert!(in_folders("".as_ref()).unwrap().is_empty());
     let error = list(&[Path::new("/no/such/folder")]).unwrap_err().to_string();
     assert!(error.contains("/no/such/folder") && error.contains("LONGAN_PLUGIN_PATH"), "{error}");
 }
