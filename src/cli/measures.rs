@@ -12,17 +12,21 @@ use super::plugin::Plugins;
 /// Every measure, with its definition, unit and rank; N stands for any rank from 1.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-Formulas: `longan map --measure \"NAME = EXPRESSION\"` makes a measure of others. NAME, in capitals, names the column. An
-expression has the built-in measures by their names, with _ for each hyphen (psi2_direction, rank4_mid), since a hyphen
-is a subtraction there; the moments' parts psiN.re and psiN.im, N from 0; numbers, pi, tau and e; + - * / ^ and brackets;
-  abs acos asin atan cbrt ceil cos cosh degrees exp floor ln log10 log2 radians round sin sinh sqrt tan tanh
-of one number, atan2 hypot max min of two. As in mathematics, -2^2 is -4 and 2^3^2 is 2^9. Angles in functions are in
-radians; degrees(x) and radians(x) convert. Where a measure is undefined, or a step has no finite number, so is the
+Formulas: `longan map --measure \"NAME = EXPRESSION\"` makes a measure of others; NAME, in capitals, names the column. \
+An expression has the built-in measures by their names, with _ for each hyphen (psi2_direction, rank4_mid), since a \
+hyphen is a subtraction there; the moments' parts psiN.re and psiN.im, N from 0; numbers, pi, tau and e; + - * / ^ and \
+brackets; and these functions, with angles in radians:
+
+  abs acos asin atan cbrt ceil cos cosh degrees exp floor ln log10 log2
+  radians round sin sinh sqrt tan tanh, of one number
+  atan2 hypot max min, of two
+
+As in mathematics, -2^2 is -4 and 2^3^2 is 2^9. Where a measure is undefined, or a step has no finite number, so is the \
 formula. The header of the output keeps it as FORMULA1, FORMULA2 and so on.
 
-Plugins: libraries with measures of one's own, in C or Rust, named by --plugin or lying in a folder of the environment
-variable LONGAN_PLUGIN_PATH. A measure whose name others have too is named with its plugin, as in example:evq, and a
-built-in as longan:evq. A plugin is code that runs with your rights, from the moment that it is loaded, also for this
+Plugins: libraries with measures of one's own, in C or Rust, named by --plugin or lying in a folder of the environment \
+variable LONGAN_PLUGIN_PATH. A measure whose name others have too is named with its plugin, as in example:evq, and a \
+built-in as longan:evq. A plugin is code that runs with your rights, from the moment that it is loaded, also for this \
 list: load only what you trust. `longan plugin new NAME` starts one.")]
 pub(crate) struct Arguments {
     #[command(flatten)]

@@ -30,6 +30,7 @@ Examples:
   longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
   longan map sims/*.fits -o maps/        many maps, one output each
   longan totals sky.fits                 area, length and Euler characteristic
+  longan plugin new beta                 a crate in Rust for a measure of one's own
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
 Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]

@@ -133,9 +133,17 @@ fn progress_is_shown_at_a_terminal_only() {
 #[test]
 fn help_fits_a_terminal_and_its_examples_run() {
     let folder = Folder::new();
-    for words in
-        ["--help", "-h", "map --help", "map -h", "totals --help", "info --help", "measures --help", "demo --help"]
-    {
+    for words in [
+        "--help",
+        "-h",
+        "map --help",
+        "map -h",
+        "totals --help",
+        "info --help",
+        "measures --help",
+        "demo --help",
+        "plugin new --help",
+    ] {
         let help = folder.done(words);
         assert!(help.contains("Usage: longan") && help.lines().all(|l| l.chars().count() <= 100), "{help}");
     }
