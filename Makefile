@@ -48,6 +48,8 @@ bench: setup ## compare longan's speed with that of its peers (NSIDE=512), and p
 	cargo build --release --workspace $(CARGOFLAGS)
 	python=$$(tools/setup python) && "$${python:-python3}" benches/peers.py $(NSIDE)
 	python3 benches/plugins.py
+	@if command -v cdo >/dev/null && command -v nccopy >/dev/null; then python3 benches/regrid.py; \
+	else echo "bench: no cdo or nccopy, so regridding is not compared with it" >&2; fi
 
 install: setup ## install longan with cargo
 	cargo install --path . --locked

@@ -4,8 +4,8 @@
 Usage: peers.py [NSIDE ...]        (default: 512)
 
 Needs healpy. LONGAN names the binary (default: target/release/longan); LITCHI that of litchi, which is left out
-otherwise. Everything is timed on the same simulated sky, with 13 thresholds from -3 to 3 sigma and windows of 6 degrees;
-longan and healpy take turns, and medians are printed. Times of longan hold reading and writing; healpy's map is in memory
+otherwise. Everything is timed on the same simulated sky, with 13 thresholds from -3 to 3 sigma and windows of 6 degrees
+unless said otherwise; longan and healpy take turns, and medians are printed. Times of longan hold reading and writing; healpy's map is in memory
 already, in an interpreter that has run it before.
 """
 
@@ -50,11 +50,16 @@ def compare(nside, folder):
     values = sky(nside)
     path, out = os.path.join(folder, "sky.fits"), os.path.join(folder, "out.fits")
     healpy.write_map(path, values, dtype=numpy.float64, overwrite=True)
+    full = ["--nside-out", str(nside)]
     jobs = {
-        "longan map, EVQ": ["map", path, "-o", out],
-        "longan map, EVQ, psi2 and rank4-mid": ["map", path, "-o", out, "--measure", "evq,psi2,rank4-mid"],
+        "longan map, EVQ": [],
+        "longan map, EVQ, psi2 and rank4-mid": ["--measure", "evq,psi2,rank4-mid"],
+        f"longan map, EVQ at Nside {nside // 16}": ["--nside-out", str(nside // 16)],
+        f"longan map, EVQ at Nside {nside}": full,
     }
-    jobs = {name: [LONGAN, *arguments, "--overwrite", "--quiet"] for name, arguments in jobs.items()}
+    if nside < 2048:
+        jobs[f"longan map, EVQ at Nside {nside}, windows of 30°"] = [*full, "--window", "30"]
+    jobs = {name: [LONGAN, "map", path, "-o", out, *options, "--overwrite", "--quiet"] for name, options in jobs.items()}
     memory = {name: memory_of(*job) for name, job in jobs.items()}
     times = {"healpy.smoothing": []} | {name: [] for name in jobs}
     healpy.smoothing(healpy.ud_grade(values, 64), fwhm=0.02)
@@ -62,9 +67,10 @@ def compare(nside, folder):
         start = time.perf_counter()
         healpy.smoothing(values, fwhm=numpy.radians(1))
         times["healpy.smoothing"].append(time.perf_counter() - start)
-        for _ in range(3):
+        for turn in range(3):
             for name, job in jobs.items():
-                times[name].append(seconds_of(*job))
+                if turn == 0 or "--nside-out" not in job:
+                    times[name].append(seconds_of(*job))
     if LITCHI:
         limits = [values.mean() + sign * 3 * values.std() for sign in (-1, 1)]
         thresholds = ["--mint", str(limits[0]), "--maxt", str(limits[1]), "--numt", "13", "--linThresh"]
@@ -72,7 +78,7 @@ def compare(nside, folder):
         times["litchi, EVQ"] = [seconds_of(LITCHI, "-i", path, "-o", out, "--forceOutname", *job, *thresholds)]
 
     seconds = {name: numpy.median(runs) for name, runs in times.items()}
-    print(f"\nNside {nside} to 16, {os.cpu_count()} processors\n")
+    print(f"\nNside {nside}, to Nside 16 unless said otherwise, {os.cpu_count()} processors\n")
     print("| job | seconds | of healpy.smoothing | of longan | peak memory, bytes a pixel |")
     print("| --- | ---: | ---: | ---: | ---: |")
     for name in times:

@@ -30,18 +30,20 @@ pub enum Body {
     Below,
 }
 
-/// A field on the grid, sorted into bins between thresholds.
+/// A field on the grid and the thresholds at which to contour it.
 #[derive(Debug)]
 pub struct Field<'a> {
     grid: Healpix,
     values: &'a [f64],
     thresholds: &'a [f64],
     body: Body,
-    /// Number of thresholds ≤ value, or [`MASKED`].
-    bins: Vec<u16>,
 }
 
+/// The bin of a masked pixel.
 const MASKED: u16 = u16::MAX;
+
+/// Pixels sorted into bins at a time.
+const BINNED: usize = 1024;
 
 impl<'a> Field<'a> {
     /// Values in RING order (NaN: masked) with the thresholds at which to contour them.
@@ -50,9 +52,7 @@ impl<'a> Field<'a> {
     /// If the number of values is not the grid's.
     pub fn new(grid: Healpix, values: &'a [f64], thresholds: &'a Thresholds, body: Body) -> Self {
         assert_eq!(values.len(), grid.pixels(), "one value for each pixel");
-        let thresholds = thresholds.values();
-        let bin = |v: &f64| if v.is_nan() { MASKED } else { thresholds.partition_point(|t| t <= v) as u16 };
-        Field { grid, values, thresholds, body, bins: values.par_iter().map(bin).collect() }
+        Field { grid, values, thresholds: thresholds.values(), body }
     }
 
     /// The grid.
@@ -67,7 +67,34 @@ impl<'a> Field<'a> {
 
     /// Whether any pixel is masked.
     pub fn has_masked(&self) -> bool {
-        self.bins.par_iter().any(|&b| b == MASKED)
+        self.values.par_iter().any(|v| v.is_nan())
+    }
+
+    /// The bins of the pixels that are corners of cells on these cell rings, and the first of these pixels.
+    fn bins(&self, cells: &Range<usize>) -> (usize, Vec<u16>) {
+        let last = self.grid.ring(cells.end.min(self.grid.rings()));
+        let first = self.grid.ring(cells.start.saturating_sub(1).max(1)).start;
+        let values = &self.values[first..last.start + last.len];
+        let mut bins = vec![0; values.len()];
+        for (values, bins) in values.chunks(BINNED).zip(bins.chunks_mut(BINNED)) {
+            sort_into_bins(values, self.thresholds, bins);
+        }
+        (first, bins)
+    }
+}
+
+/// The number of thresholds ≤ each value, or [`MASKED`].
+#[multiversion::multiversion(targets = "simd")]
+fn sort_into_bins(values: &[f64], thresholds: &[f64], bins: &mut [u16]) {
+    for &threshold in thresholds {
+        for (bin, &value) in bins.iter_mut().zip(values) {
+            *bin += u16::from(threshold <= value);
+        }
+    }
+    for (bin, value) in bins.iter_mut().zip(values) {
+        if value.is_nan() {
+            *bin = MASKED;
+        }
     }
 }
 
@@ -155,11 +182,12 @@ pub trait Sink {
     fn ring_finished(&mut self, ring: usize);
 }
 
-/// Marches through all cells of these cell rings (`0..=4 Nside`), ring by ring and eastwards within a sector.
+/// Marches through all cells of these cell rings (`0..=4 Nside`, at least one), ring by ring and eastwards within a sector.
 ///
 /// Inlined, so that callers compiled for a processor's own instructions make use of them here.
 #[inline(always)]
 pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
+    let (first, bins_of) = field.bins(&rings);
     for i in rings {
         let ring = CellRing::new(field.grid, i);
         let mut known: Option<(Geometry, f64)> = None;
@@ -171,7 +199,7 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
             for sector in 0..ring.sectors {
                 let pixels = stencil.pixels(sector);
                 let cell = Cell { ring: i, pixels: &pixels, count: stencil.count() };
-                let bins = pixels.map(|p| field.bins[p.index]);
+                let bins = pixels.map(|p| bins_of[p.index - first]);
                 // A triangle's fourth corner repeats its first.
                 let lo = bins[0].min(bins[1]).min(bins[2].min(bins[3]));
                 let hi = bins[0].max(bins[1]).max(bins[2].max(bins[3]));

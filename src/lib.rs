@@ -24,6 +24,18 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A field of any file that longan reads, whatever its grid, comes from [`formats::read`]:
+//!
+//! ```no_run
+//! use longan::formats::{self, At, Place, Selection};
+//!
+//! let level = At { dimension: "level".to_owned(), place: Place::Value("500".to_owned()) };
+//! let map = formats::read("era5.nc".as_ref(), &Selection { at: vec![level], nside: Some(64), ..Selection::default() })?;
+//! # Ok::<(), formats::Error>(())
+//! ```
+//!
+//! Where it has several times, [`formats::open`] gives one map after the other.
+//!
 //! The way of a field: [`formats`] → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
 //! pixels, by [`transport`] → moments of [`window`]s, or [`totals`] → [`measures`] → output.
 //! [`Analysis`] brings these together. No module here prints or knows a path.

@@ -27,18 +27,20 @@ impl Totals {
 
 /// Totals for each threshold, in the field's order, and the area of masked cells in steradian.
 pub fn totals(field: &Field<'_>) -> (Vec<Totals>, f64) {
-    let rings: Vec<RingTotals> = (0..=4 * field.grid().nside())
+    let past = 4 * field.grid().nside() + 1;
+    let chunks: Vec<Vec<RingTotals>> = (0..past.div_ceil(CHUNK))
         .into_par_iter()
-        .map(|ring| {
-            let mut sink = RingTotals { by_threshold: vec![Totals::default(); field.thresholds()], masked: 0.0 };
-            march(field, ring..ring + 1, &mut sink);
-            sink
+        .map(|i| {
+            let ring = RingTotals { by_threshold: vec![Totals::default(); field.thresholds()], masked: 0.0 };
+            let mut sink = ByRing { ring: ring.clone(), empty: ring, finished: Vec::new() };
+            march(field, i * CHUNK..((i + 1) * CHUNK).min(past), &mut sink);
+            sink.finished
         })
         .collect();
     // Summed in the order of the rings, so that the number of threads makes no difference.
     let mut totals = vec![Totals::default(); field.thresholds()];
     let mut masked = 0.0;
-    for ring in &rings {
+    for ring in chunks.iter().flatten() {
         for (total, part) in totals.iter_mut().zip(&ring.by_threshold) {
             total.area += part.area;
             total.length += part.length;
@@ -49,34 +51,47 @@ pub fn totals(field: &Field<'_>) -> (Vec<Totals>, f64) {
     (totals, masked)
 }
 
+/// Cell rings that are gone through in a row.
+const CHUNK: usize = 32;
+
+#[derive(Clone)]
 struct RingTotals {
     by_threshold: Vec<Totals>,
     masked: f64,
 }
 
-impl Sink for RingTotals {
+/// Totals of the present ring, and of those finished.
+struct ByRing {
+    ring: RingTotals,
+    empty: RingTotals,
+    finished: Vec<RingTotals>,
+}
+
+impl Sink for ByRing {
     fn wants_area(&self) -> bool {
         true
     }
 
     fn masked(&mut self, _: Cell<'_>, area: f64) {
-        self.masked += area;
+        self.ring.masked += area;
     }
 
     fn inside(&mut self, _: Cell<'_>, thresholds: Range<usize>, area: f64) {
-        self.by_threshold[thresholds].iter_mut().for_each(|t| t.area += area);
+        self.ring.by_threshold[thresholds].iter_mut().for_each(|t| t.area += area);
     }
 
     fn area(&mut self, _: Cell<'_>, threshold: usize, area: f64) {
-        self.by_threshold[threshold].area += area;
+        self.ring.by_threshold[threshold].area += area;
     }
 
     fn contour(&mut self, _: Cell<'_>, threshold: usize, segments: &[Segment<'_>]) {
-        self.by_threshold[threshold].length += segments.iter().map(Segment::length).sum::<f64>();
-        self.by_threshold[threshold].curvature += segments.iter().map(Segment::turn).sum::<f64>();
+        self.ring.by_threshold[threshold].length += segments.iter().map(Segment::length).sum::<f64>();
+        self.ring.by_threshold[threshold].curvature += segments.iter().map(Segment::turn).sum::<f64>();
     }
 
     fn cell_finished(&mut self, _: Cell<'_>) {}
 
-    fn ring_finished(&mut self, _: usize) {}
+    fn ring_finished(&mut self, _: usize) {
+        self.finished.push(std::mem::replace(&mut self.ring, self.empty.clone()));
+    }
 }

@@ -18,8 +18,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::contour::Field;
-use crate::moments::{self, Layout, RingMoments, SHARES, Selection};
-use prefix::Plan;
+use crate::moments::{self, Layout, RingMoments, SHARES, Selection, Weight};
+use prefix::Way;
 use reach::{OutputRing, Reached};
 
 /// Rings of input moments that are made at a time.
@@ -30,6 +30,9 @@ const GROUP: usize = 32;
 
 /// Most input rings to a block.
 const BLOCK: usize = 32;
+
+/// Rings to a block that is not divided further.
+const SMALLEST: usize = 2;
 
 /// Most windows that are visited together.
 const BATCH: usize = 256;
@@ -262,18 +265,53 @@ impl Group {
             let past = (first..end).find(|&i| i - first == BLOCK || band.theta(i) - north > radius / 4.0);
             let rings = first..past.unwrap_or(end);
             first = rings.end;
-            let block = Block::new(&self.rings, band, rings, radius);
-            let plan = if radius > 0.0 { Plan::new(&block, layout, of.summation) } else { None };
-            self.quadrants.par_iter_mut().enumerate().for_each(|(quadrant, sums)| match &plan {
-                Some(plan) => prefix::add(&block, quadrant, layout, plan, sums),
-                None if radius == 0.0 => add_pixels(&block, quadrant, layout, sums),
-                None => direct::add(&block, quadrant, layout, sums),
-            });
-            self.ways.add(match plan {
-                Some(plan) => plan.ways(&block),
-                None => Ways { direct: block.pairs().map(|(ring, _)| 4 * ring.in_quadrant).sum(), ..Ways::default() },
-            });
+            self.add_block(band, rings, 0..self.rings.len(), of, layout, radius);
         }
+    }
+
+    /// Adds a block of input rings to some of the group's output rings; in smaller blocks where that lets prefix sums
+    /// meet their tolerance.
+    fn add_block(
+        &mut self,
+        band: &Band,
+        rings: Range<usize>,
+        output: Range<usize>,
+        of: &MovingWindows<'_>,
+        layout: &Layout,
+        radius: f64,
+    ) {
+        let block = Block::new(&self.rings[output.clone()], band, rings.clone(), radius);
+        let way = if radius > 0.0 { Way::find(&block, layout, of.summation) } else { Way::Direct };
+        if matches!(way, Way::Missed) && rings.len().max(output.len()) > SMALLEST {
+            let halves = |range: &Range<usize>| {
+                let middle = range.start + range.len() / 2;
+                [range.start..middle, middle..range.end]
+            };
+            if rings.len() >= output.len() {
+                for rings in halves(&rings) {
+                    self.add_block(band, rings, output.clone(), of, layout, radius);
+                }
+            } else {
+                for output in halves(&output) {
+                    self.add_block(band, rings.clone(), output, of, layout, radius);
+                }
+            }
+            return;
+        }
+        self.quadrants.par_iter_mut().enumerate().for_each(|(quadrant, sums)| {
+            let sums = &mut sums[output.clone()];
+            match &way {
+                Way::Prefix(plan) => prefix::add(&block, quadrant, layout, plan, sums),
+                _ if radius == 0.0 => add_pixels(&block, quadrant, layout, sums),
+                _ => direct::add(&block, quadrant, layout, sums),
+            }
+        });
+        let pairs = block.pairs().map(|(ring, _)| 4 * ring.in_quadrant).sum();
+        self.ways.add(match way {
+            Way::Prefix(plan) => plan.ways(&block),
+            Way::Direct => Ways { direct: pairs, ..Ways::default() },
+            Way::Missed => Ways { missed: pairs, ..Ways::default() },
+        });
     }
 }
 
@@ -332,7 +370,11 @@ fn visited<E>(
             moments.curvature = selected(layout.curvature);
             moments.psi.clear();
             let rows = (layout.first_rank..layout.rows).step_by(2);
-            moments.psi.extend(rows.map(|row| Complex64::new(mean(row), mean(row + 1))));
+            // |ψ_s| ≤ W1, which the error of prefix sums must not break where a contour is nearly straight.
+            let most =
+                if layout.weight == Weight::Length && layout.length.is_some() { moments.length } else { f64::INFINITY };
+            let bounded = |psi: Complex64| if psi.norm() > most { psi * (most / psi.norm()) } else { psi };
+            moments.psi.extend(rows.map(|row| bounded(Complex64::new(mean(row), mean(row + 1)))));
         }
         visit(batch, out)?;
     }

@@ -10,8 +10,12 @@ mod bytes;
 #[allow(dead_code)]
 mod compile;
 
+/// Every family of files, from end to end.
+mod families;
 /// Measures as formulas.
 mod formulas;
+/// Fields on grids of latitude and longitude, made by hand.
+mod gridded;
 /// `longan map` on one input.
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
@@ -24,6 +28,8 @@ mod refusals;
 mod reports;
 /// Several inputs, runs that go on where another ended, and runs that are killed.
 mod runs;
+/// Fields with steps in time, and files of them.
+mod steps;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -36,6 +42,7 @@ use tempfile::TempDir;
 
 use super::difference;
 use bytes::{Col, col, f64s, file};
+pub(crate) use gridded::Layout;
 
 /// A folder in which the program runs.
 pub(crate) struct Folder(TempDir);
@@ -139,7 +146,7 @@ impl Folder {
 
     #[track_caller]
     pub(crate) fn read_hdu(&self, name: impl AsRef<Path>, field: &str, hdu: Option<usize>) -> Map {
-        let selection = Selection { field: Some(field.parse::<Field>().unwrap()), hdu, nside: None };
+        let selection = Selection { field: Some(field.parse::<Field>().unwrap()), hdu, ..Selection::default() };
         formats::read(&self.path(name), &selection).unwrap()
     }
 
@@ -147,6 +154,14 @@ impl Folder {
     fn headers(&self, name: &str) -> Vec<BTreeMap<String, String>> {
         headers(&std::fs::read(self.path(name)).unwrap())
     }
+}
+
+/// Frees a NetCDF file that was just written here from HDF5's lock on it, which lasts a while longer where another test
+/// starts a program at this moment: that inherits the open file.
+fn unlock(path: &Path) {
+    let bytes = std::fs::read(path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    std::fs::write(path, bytes).unwrap();
 }
 
 fn ran(mut command: Command) -> Ran {

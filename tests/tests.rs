@@ -14,6 +14,8 @@ mod reference;
 mod shapes;
 /// Windows from prefix sums against windows summed directly.
 mod summation;
+/// Files that xarray opens.
+mod xarray;
 
 use longan::Map;
 use rand::{RngExt, SeedableRng};

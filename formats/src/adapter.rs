@@ -12,7 +12,12 @@ use std::str::FromStr;
 
 use flate2::read::MultiGzDecoder;
 
+use crate::csv::PointsCsv;
 use crate::healpix_fits::HealpixFits;
+use crate::map::Time;
+use crate::netcdf::Netcdf;
+use crate::ply::SurfacePly;
+use crate::zarr::{self, ZarrStore};
 use crate::{CoordinateSystem, Error, Map, Ordering};
 
 /// The field of a file that is to be read.
@@ -52,8 +57,110 @@ pub struct Selection {
     pub field: Option<Field>,
     /// The HDU, 0 for the primary one; the first HEALPix table unless given.
     pub hdu: Option<usize>,
-    /// The Nside (a power of two) to bring a multi-order map to; that of its finest cells unless given.
+    /// The Nside to bring the field to: of a multi-order map (a power of two; that of its finest cells unless given), or
+    /// of a field on another grid (that closest to its spacing unless given).
     pub nside: Option<usize>,
+    /// Places along the dimensions other than those of the sphere.
+    pub at: Vec<At>,
+    /// How fields on other grids are brought to HEALPix.
+    pub regrid: Regrid,
+}
+
+/// A place along a dimension.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct At {
+    /// Name of the dimension, or of its coordinate.
+    pub dimension: String,
+    /// The place.
+    pub place: Place,
+}
+
+/// How a place along a dimension is named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// By the value of its coordinate, such as `500` or, for times, `1997-12`.
+    Value(String),
+    /// By its number from 0.
+    Index(usize),
+}
+
+/// How fields on other grids, or at points, are brought to HEALPix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Regrid {
+    /// From grids of longitude and latitude.
+    pub method: Method,
+    /// Pixels with a smaller share of valid values than this are masked.
+    pub min_valid: f64,
+    /// From points.
+    pub gather: Gather,
+    /// Pixels whose centre is farther than this from any point, in degrees, are masked; unless given, twice the typical
+    /// distance between points, which is the median distance to the fourth nearest neighbour (coincident points count
+    /// once).
+    pub reach: Option<f64>,
+    /// The point from which a surface, or points in space, are seen; the mean of its vertices, or of them, unless given.
+    pub centre: Option<[f64; 3]>,
+    /// Whether, where a ray from the centre crosses a surface more than once, the outermost crossing counts.
+    pub allow_folds: bool,
+}
+
+impl Default for Regrid {
+    fn default() -> Self {
+        Regrid {
+            method: Method::default(),
+            min_valid: 0.5,
+            gather: Gather::default(),
+            reach: None,
+            centre: None,
+            allow_folds: false,
+        }
+    }
+}
+
+/// How a field on a grid of longitude and latitude is brought to HEALPix.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// The mean over the pixel, from the areas that grid cells and pixel share.
+    #[default]
+    Conservative,
+    /// Interpolated between the four grid points about the pixel's centre.
+    Bilinear,
+    /// The grid point nearest to the pixel's centre.
+    Nearest,
+}
+
+/// How values at points make a map.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Gather {
+    /// The mean of the points in a pixel; the nearest point where there is none.
+    #[default]
+    Mean,
+    /// The mean of all points, weighted by a Gaussian of this full width at half maximum in degrees.
+    Gaussian {
+        /// The width.
+        fwhm: f64,
+    },
+    /// The nearest point.
+    Nearest,
+}
+
+/// The maps that a selection names: one, or one for each step in time, all on one grid.
+pub trait Maps {
+    /// The times of the steps; one map without a time has none and counts as one step.
+    fn times(&self) -> &[Time];
+
+    /// Reads one map. What the steps share, such as weights, is computed once.
+    ///
+    /// # Errors
+    /// Where the file cannot be read.
+    fn read(&mut self, step: usize) -> Result<Map, Error>;
+
+    /// Reads the values of one map as the file has them, whatever their grid, but unpacked; NaN where missing.
+    ///
+    /// # Errors
+    /// Where the file cannot be read.
+    fn values(&mut self, step: usize) -> Result<Vec<f64>, Error> {
+        self.read(step).map(Map::into_values)
+    }
 }
 
 /// What a file holds.
@@ -61,31 +168,128 @@ pub struct Selection {
 pub struct Description {
     /// The file format.
     pub format: &'static str,
-    /// The tables that hold maps, in the file's order.
+    /// The tables or variables that hold maps, in the file's order.
     pub tables: Vec<TableDescription>,
 }
 
-/// What one table of a file holds.
+/// What one table or variable of a file holds.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct TableDescription {
-    /// Number of the HDU, 0 for the primary one.
-    pub hdu: usize,
-    /// Name of the extension.
-    pub name: Option<String>,
-    /// Nside of the grid; of a multi-order table that of the finest cells.
-    pub nside: usize,
-    /// The ordering.
-    pub ordering: Ordering,
-    /// Whether the file does not say its ordering, so that RING is assumed.
-    pub ordering_assumed: bool,
-    /// The coordinate system, where the file names one.
-    pub coordinates: Option<CoordinateSystem>,
-    /// How values are tied to pixels.
-    pub indexing: Indexing,
-    /// Number of pixels (of a multi-order table: cells) that the table has values for.
-    pub pixels: usize,
-    /// The data columns.
+    /// Where it is in the file.
+    #[serde(flatten)]
+    pub place: TablePlace,
+    /// The grid.
+    #[serde(flatten)]
+    pub grid: GridDescription,
+    /// The dimensions other than those of the sphere.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dimensions: Vec<DimensionDescription>,
+    /// The data columns, or the one field of a variable.
     pub fields: Vec<FieldDescription>,
+}
+
+/// Where a table or variable is in its file.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(untagged)]
+pub enum TablePlace {
+    /// In an HDU of a FITS file.
+    Hdu {
+        /// Number of the HDU, 0 for the primary one.
+        hdu: usize,
+        /// Name of the extension.
+        name: Option<String>,
+    },
+    /// In a variable of its own.
+    Variable {
+        /// The path of the variable: its name, after its group's.
+        variable: String,
+    },
+    /// The whole of a file that has but one.
+    File {},
+}
+
+/// The grid of a table or variable.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(untagged)]
+pub enum GridDescription {
+    /// HEALPix.
+    Healpix {
+        /// Nside of the grid; of a multi-order table that of the finest cells.
+        nside: usize,
+        /// The ordering.
+        ordering: Ordering,
+        /// Whether the file does not say its ordering, so that RING is assumed.
+        ordering_assumed: bool,
+        /// The coordinate system, where the file names one.
+        coordinates: Option<CoordinateSystem>,
+        /// How values are tied to pixels.
+        indexing: Indexing,
+        /// Number of pixels (of a multi-order table: cells) that the table has values for.
+        pixels: usize,
+    },
+    /// Latitudes and longitudes.
+    LatLon {
+        /// The latitudes, in degrees.
+        latitudes: AxisDescription,
+        /// The longitudes, in degrees.
+        longitudes: AxisDescription,
+        /// Whether the cells cover the sphere.
+        global: bool,
+    },
+    /// Points anywhere.
+    Points {
+        /// Their number.
+        points: usize,
+        /// The coordinate system, where the file names one.
+        coordinates: Option<CoordinateSystem>,
+        /// The typical distance between them, in degrees.
+        spacing: Option<f64>,
+        /// The Nside that is used unless one is given.
+        nside: Option<usize>,
+        /// The share of the sphere that is as near to a point as it must be, unless a reach is given.
+        covered: Option<f64>,
+    },
+    /// A surface of triangles.
+    Surface {
+        /// The number of vertices.
+        vertices: usize,
+        /// The number of triangles.
+        triangles: usize,
+        /// The point that it is seen from unless one is given.
+        centre: [f64; 3],
+        /// The Nside that is used unless one is given.
+        nside: usize,
+        /// The share of the sphere in which it is seen from there.
+        covered: f64,
+        /// The share of the sphere in which it is seen more than once.
+        folded: f64,
+    },
+}
+
+/// The values of a coordinate.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct AxisDescription {
+    /// How many they are.
+    pub count: usize,
+    /// The first.
+    pub first: f64,
+    /// The last.
+    pub last: f64,
+    /// The distance from one to the next, where it is always the same.
+    pub spacing: Option<f64>,
+}
+
+/// A dimension other than those of the sphere.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct DimensionDescription {
+    /// Its name.
+    pub name: String,
+    /// Its length.
+    pub len: usize,
+    /// Whether it is time, so that there is a map for each place.
+    pub time: bool,
+    /// The values of its coordinate and their unit, abbreviated.
+    pub values: String,
 }
 
 /// How a table ties values to pixels.
@@ -107,6 +311,9 @@ pub struct FieldDescription {
     pub name: String,
     /// Its unit, where the file names one.
     pub unit: Option<String>,
+    /// What it is in words, where the file says it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub long_name: Option<String>,
 }
 
 /// A reader of one family of files.
@@ -124,22 +331,33 @@ pub trait Adapter: Sync {
     /// Where the file cannot be read or holds no map.
     fn describe(&self, path: &Path) -> Result<Description, Error>;
 
-    /// Reads one field.
+    /// Finds what is selected, so that its maps can be read.
     ///
     /// # Errors
     /// Where the file cannot be read, or has not what is selected.
-    fn read(&self, path: &Path, selection: &Selection) -> Result<Map, Error>;
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error>;
 }
 
-/// All adapters; the first that recognises a file reads it.
-static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits];
+/// All adapters of files; the first that recognises a file reads it.
+static ADAPTERS: &[&dyn Adapter] = &[&HealpixFits, &Netcdf, &SurfacePly, &PointsCsv];
 
-/// Reads one field of a file of any known format.
+/// Finds what is selected of a file of any known format.
 ///
 /// # Errors
 /// [`Error::File`], which names the file, around the reason.
+pub fn open(path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    adapter(path).and_then(|adapter| adapter.open(path, selection)).map_err(|e| e.of(path))
+}
+
+/// Reads one map of a file of any known format.
+///
+/// # Errors
+/// [`Error::File`], which names the file, around the reason; [`Error::Steps`] where there is one map for each of several
+/// times.
 pub fn read(path: &Path, selection: &Selection) -> Result<Map, Error> {
-    adapter(path).and_then(|adapter| adapter.read(path, selection)).map_err(|e| e.of(path))
+    let mut maps = open(path, selection)?;
+    let steps = maps.times().len();
+    if steps > 1 { Err(Error::Steps { steps }) } else { maps.read(0) }.map_err(|e| e.of(path))
 }
 
 /// What a file of any known format holds.
@@ -150,11 +368,16 @@ pub fn describe(path: &Path) -> Result<Description, Error> {
     adapter(path).and_then(|adapter| adapter.describe(path)).map_err(|e| e.of(path))
 }
 
-/// The adapter for a file.
+/// Whether a path is a folder that is read as if it were a file: a Zarr store.
+pub fn is_store(path: &Path) -> bool {
+    path.is_dir() && zarr::is_zarr(path)
+}
+
+/// The adapter for a file, or for a folder that is a store.
 fn adapter(path: &Path) -> Result<&'static dyn Adapter, Error> {
     let metadata = std::fs::metadata(path).map_err(Error::io("open it"))?;
     if metadata.is_dir() {
-        return Err(Error::Folder);
+        return if zarr::is_zarr(path) { Ok(&ZarrStore) } else { Err(Error::Folder) };
     }
     if !metadata.is_file() {
         return Err(Error::NotRegular);
@@ -184,10 +407,6 @@ pub(crate) fn is_gzip(head: &[u8]) -> bool {
 /// In words, what a file that begins with `head` looks like.
 fn looks_like(head: &[u8]) -> &'static str {
     const MAGIC: &[(&[u8], &str)] = &[
-        (b"\x89HDF\r\n\x1a\n", "an HDF5 or NetCDF-4 file"),
-        (b"CDF\x01", "a NetCDF file"),
-        (b"CDF\x02", "a NetCDF file"),
-        (b"CDF\x05", "a NetCDF file"),
         (b"GRIB", "a GRIB file"),
         (b"PK\x03\x04", "a ZIP archive (or NumPy .npz)"),
         (b"\x93NUMPY", "a NumPy .npy array"),
@@ -212,7 +431,8 @@ fn looks_like(head: &[u8]) -> &'static str {
     let utf8 = std::str::from_utf8(head).map_or_else(|e| e.error_len().is_none(), |_| true);
     if utf8 && head.iter().all(|&b| b >= b' ' || b"\t\r\n".contains(&b)) {
         let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
-        return if first_line.contains(&b',') { "a text file (perhaps CSV)" } else { "a text file" };
+        let csv = "a text file (perhaps CSV) without columns of longitude and latitude, or of x, y and z";
+        return if first_line.contains(&b',') { csv } else { "a text file" };
     }
     "a file of an unknown kind"
 }

@@ -1,5 +1,6 @@
 //! What can be wrong with a map or a file of one, each said in one sentence with its remedy.
 
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -58,7 +59,7 @@ pub enum Error {
     #[error("there is no such file; check the name and the folder")]
     Missing,
     /// A folder was named where a file is needed.
-    #[error("this is a folder; name a file in it")]
+    #[error("this is a folder, but neither a file nor a Zarr store; name a file in it")]
     Folder,
     /// A pipe, device or socket was named where a file is needed.
     #[error("this is not a regular file but a pipe or a device; save the data to a file first")]
@@ -75,7 +76,9 @@ pub enum Error {
     },
 
     /// Not a file that any adapter reads.
-    #[error("this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed; convert it first")]
+    #[error(
+        "this is {found}, but longan reads HEALPix maps in FITS files, plain or gzip-compressed, fields in NetCDF files and Zarr stores, points in CSV files with columns such as lon, lat, and surfaces in PLY files; convert it first"
+    )]
     NotRecognised {
         /// What the content looks like.
         found: &'static str,
@@ -332,6 +335,626 @@ pub enum Error {
         gibibytes: f64,
     },
 
+    /// The NetCDF library refused.
+    #[error("cannot {action}: the NetCDF library says \"{message}\"; check the file with ncdump -h")]
+    Netcdf {
+        /// What was attempted.
+        action: String,
+        /// libnetcdf's words for what is wrong.
+        message: String,
+    },
+    /// The NetCDF library could not write.
+    #[error("cannot {action}: the NetCDF library says \"{message}\"; check the space and the permissions there")]
+    NetcdfWrite {
+        /// What was attempted.
+        action: String,
+        /// libnetcdf's words for what is wrong.
+        message: String,
+    },
+    /// A grid that CF has no refinement level for.
+    #[error(
+        "Nside {nside} is not a power of two, which HEALPix in NetCDF needs (its refinement level is log2 Nside); write FITS"
+    )]
+    RefinementLevel {
+        /// The Nside.
+        nside: usize,
+    },
+    /// Steps that a NetCDF file has no room for.
+    #[error(
+        "step {step} does not go with the file's columns and axis of time; give each step all columns and its time, or a file without such an axis one step"
+    )]
+    StepTime {
+        /// The step, from 1.
+        step: usize,
+    },
+    /// A NetCDF 3 header that makes no sense.
+    #[error("the NetCDF header is damaged or cut short; fetch the file again")]
+    NetcdfHeader,
+    /// A NetCDF file with less data than its header promises.
+    #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
+    NetcdfTruncated {
+        /// The size that the header implies, in bytes.
+        needed: u128,
+        /// The file's size in bytes.
+        found: u64,
+    },
+    /// A variable too large for the memory.
+    #[error("'{variable}' needs {gibibytes:.1} GiB, more memory than there is; choose a part of it with --select")]
+    VariableMemory {
+        /// The variable, or the attribute.
+        variable: String,
+        /// The memory needed.
+        gibibytes: f64,
+    },
+    /// A variable that holds no numbers.
+    #[error("variable '{variable}' holds {found}, which is not a field of numbers; choose another variable")]
+    VariableKind {
+        /// The variable.
+        variable: String,
+        /// What it holds.
+        found: &'static str,
+    },
+    /// An attribute with an impossible value.
+    #[error(
+        "variable '{variable}' has {attribute} = {found}, which is not {expected}; correct it, such as with ncatted"
+    )]
+    AttributeValue {
+        /// The variable.
+        variable: String,
+        /// The attribute.
+        attribute: &'static str,
+        /// Its value.
+        found: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// No variable that could be a map.
+    #[error(
+        "no variable is on a HEALPix grid, or has dimensions of latitude and longitude in degrees; the variables are {variables}"
+    )]
+    NoLatLon {
+        /// The variables and their dimensions.
+        variables: String,
+    },
+    /// Several variables that could be meant.
+    #[error("there are several variables, so name one with --variable: {variables}")]
+    SeveralVariables {
+        /// The variables, their dimensions and units.
+        variables: String,
+    },
+    /// A variable that is not there, or is no map.
+    #[error("there is no variable {variable} with latitude and longitude; those that have them are {variables}")]
+    UnknownVariable {
+        /// The name or number asked for.
+        variable: String,
+        /// The variables that have them.
+        variables: String,
+    },
+    /// A variable that is not there, among those on a HEALPix grid.
+    #[error("there is no variable {variable}; those on a HEALPix grid are {variables}")]
+    UnknownHealpix {
+        /// The name or number asked for.
+        variable: String,
+        /// The variables on a HEALPix grid.
+        variables: String,
+    },
+    /// A dimension without places.
+    #[error(
+        "dimension '{dimension}' of variable '{variable}' has length 0, so there is nothing to read; check how the file was made"
+    )]
+    EmptyDimension {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+    },
+    /// Coordinates over two dimensions.
+    #[error(
+        "variable '{variable}' is on a curvilinear grid, whose coordinate '{coordinate}' has two dimensions, but only rectilinear ones are read; regrid it first, such as with cdo remapbil,global_1"
+    )]
+    Curvilinear {
+        /// The variable.
+        variable: String,
+        /// The coordinate.
+        coordinate: String,
+    },
+    /// A latitude and a longitude for each place of one dimension.
+    #[error(
+        "variable '{variable}' is on an unstructured grid, whose latitudes and longitudes both run along '{dimension}', but only rectilinear ones are read; regrid it first, such as with cdo remapnn,global_1"
+    )]
+    Unstructured {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+    },
+    /// Coordinates of a rotated or projected grid.
+    #[error(
+        "coordinate '{coordinate}' is a {found}, not a latitude or longitude; regrid the field first, such as with cdo remapbil,global_1"
+    )]
+    OtherAxis {
+        /// The coordinate.
+        coordinate: String,
+        /// Its standard name.
+        found: String,
+    },
+    /// Coordinates in radians.
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', but degrees are needed; multiply it by 180/pi and set its units to degrees, such as with ncap2"
+    )]
+    CoordinateRadians {
+        /// The coordinate.
+        coordinate: String,
+        /// Its unit.
+        units: String,
+    },
+    /// Coordinates in metres or other units.
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', not degrees; bring the field to a grid of latitude and longitude first, such as with gdalwarp -t_srs EPSG:4326"
+    )]
+    CoordinateUnits {
+        /// The coordinate.
+        coordinate: String,
+        /// Its unit.
+        units: String,
+    },
+    /// A dimension to choose along that is not there.
+    #[error("variable '{variable}' has no dimension '{dimension}' to choose along; its dimensions are {dimensions}")]
+    NoSuchDimension {
+        /// The variable.
+        variable: String,
+        /// The name asked for.
+        dimension: String,
+        /// The dimensions and their lengths.
+        dimensions: String,
+    },
+    /// A place chosen along latitude or longitude.
+    #[error("dimension '{dimension}' runs over the sphere, all of which is read; leave it out of --select")]
+    SphereDimension {
+        /// The dimension.
+        dimension: String,
+    },
+    /// Two choices along one dimension.
+    #[error("dimension '{dimension}' is chosen along twice; leave one --select out")]
+    SelectedTwice {
+        /// The dimension.
+        dimension: String,
+    },
+    /// A value that a coordinate does not have.
+    #[error("there is no {dimension} = {place}; the values are {values}")]
+    NoSuchPlace {
+        /// The dimension.
+        dimension: String,
+        /// The value asked for.
+        place: String,
+        /// The values.
+        values: String,
+    },
+    /// A value that a coordinate has more than once.
+    #[error(
+        "{dimension} = {place} is met {count} times; choose one by its number, such as --select {dimension}=#{first}"
+    )]
+    SeveralPlaces {
+        /// The dimension.
+        dimension: String,
+        /// The value asked for.
+        place: String,
+        /// How often.
+        count: usize,
+        /// The number of the first.
+        first: usize,
+    },
+    /// A place beyond a dimension.
+    #[error("there is no {dimension} = #{index}; they are numbered from #0 to #{last}")]
+    IndexRange {
+        /// The dimension.
+        dimension: String,
+        /// The number asked for.
+        index: usize,
+        /// The last number.
+        last: usize,
+    },
+    /// A dimension along which nothing is chosen.
+    #[error(
+        "variable '{variable}' has several values along '{dimension}': {values}; choose one with --select {dimension}=VALUE"
+    )]
+    DimensionLeft {
+        /// The variable.
+        variable: String,
+        /// The dimension.
+        dimension: String,
+        /// The values.
+        values: String,
+    },
+    /// An HDU asked of a file that has none.
+    #[error("there is no HDU {hdu} in a file of this format; leave --hdu out")]
+    NoHdus {
+        /// The HDU asked for.
+        hdu: usize,
+    },
+    /// A number beyond those of 64 bits with a sign.
+    #[error("variable '{variable}' holds {value}, beyond 2^63 - 1; store it as a signed or a real number")]
+    LargeNumber {
+        /// The variable.
+        variable: String,
+        /// The number.
+        value: u64,
+    },
+
+    /// Text without the columns that say where points are.
+    #[error(
+        "no line of this text names columns of longitude and latitude, or of x, y and z; add a line such as 'lon,lat,value' before the numbers"
+    )]
+    NoPointColumns,
+    /// Two columns of which either could be the one that is needed.
+    #[error("columns '{first}' and '{second}' could both be the {coordinate}; rename one of them")]
+    TwoCoordinates {
+        /// What is needed, such as "longitude".
+        coordinate: &'static str,
+        /// One column.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Angles that are not in degrees.
+    #[error("the angles in column '{column}' are in radians; convert them to degrees")]
+    RadianColumn {
+        /// The column.
+        column: String,
+    },
+    /// A column that is not there.
+    #[error("there is no column {field}; the columns of values are {columns}")]
+    UnknownColumn {
+        /// The name or number asked for.
+        field: String,
+        /// The columns that could be a map.
+        columns: String,
+    },
+    /// Several columns where one is needed.
+    #[error("several columns could be the map: {columns}; choose one by its name or number with --variable")]
+    SeveralColumns {
+        /// The columns.
+        columns: String,
+    },
+    /// Points that carry nothing.
+    #[error("there is no column of numbers besides {coordinates}; name the column of values with --variable")]
+    NoValueColumn {
+        /// The columns that are no values.
+        coordinates: String,
+    },
+    /// A field that is not given at points.
+    #[error("the points have no dimension '{dimension}' to choose from; leave --select out, or pick the rows first")]
+    NoDimension {
+        /// The dimension asked for.
+        dimension: String,
+    },
+    /// A row with too few or too many cells.
+    #[error("{place} has {found} values but there are {expected} columns; correct it")]
+    RowLength {
+        /// The row.
+        place: String,
+        /// Its values.
+        found: usize,
+        /// The columns that the header names.
+        expected: usize,
+    },
+    /// Something else where a number is needed.
+    #[error("{place} has '{text}' as '{column}', which is not {expected}; correct it")]
+    BadNumber {
+        /// The row or vertex.
+        place: String,
+        /// The column.
+        column: String,
+        /// What is there.
+        text: String,
+        /// What is needed.
+        expected: &'static str,
+    },
+    /// A point without a direction.
+    #[error("{place} lies at the centre, so it has no direction from there; name another point with --centre")]
+    AtCentre {
+        /// The row or vertex.
+        place: String,
+    },
+    /// No point with a value.
+    #[error("column '{column}' has no value at any point; choose another with --variable")]
+    NoValues {
+        /// The column.
+        column: String,
+    },
+    /// Too few points to know how dense they are.
+    #[error("the points are all at one place, so nothing tells how dense they are; give both --nside and --reach")]
+    OnePlace,
+    /// A way of gathering that cannot be.
+    #[error("{what} is {value}, which is not {expected}; correct it")]
+    Setting {
+        /// The setting, such as "the reach".
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// A PLY header that is wrong.
+    #[error("line {line} of the header is '{text}', which is not {expected}; correct it")]
+    PlyHeader {
+        /// The line, from 1.
+        line: usize,
+        /// The line's text.
+        text: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// A PLY file that is no surface with values.
+    #[error("this PLY file has no {missing}; save it as a surface of triangles with a value at each vertex")]
+    PlyLacks {
+        /// What is missing.
+        missing: &'static str,
+    },
+    /// A PLY file that ends too early.
+    #[error(
+        "the file ends after {found} of {count} entries of '{element}'; it is cut short or its header is wrong, so fetch it again"
+    )]
+    PlyTruncated {
+        /// The element.
+        element: String,
+        /// Complete entries.
+        found: u64,
+        /// The entries that the header promises.
+        count: u64,
+    },
+    /// A face with a corner that is not there.
+    #[error(
+        "face {face} (from 0) has vertex {vertex}, but the file has {vertices} vertices, numbered from 0; correct the faces"
+    )]
+    FaceVertex {
+        /// The face.
+        face: u64,
+        /// The number of the vertex, as the file has it.
+        vertex: f64,
+        /// The number of vertices.
+        vertices: u64,
+    },
+    /// A surface that is not seen from its centre once in each direction.
+    #[error(
+        "seen from the centre, {never} of the sphere has no surface and {several} has more than one layer; name a point inside with --centre, or take the outermost layer with --allow-folds"
+    )]
+    Crossings {
+        /// Share of the sphere whose rays never cross the surface.
+        never: Percent,
+        /// Share of the sphere whose rays cross it more than once.
+        several: Percent,
+    },
+
+    /// One map for each of several times where one map is needed.
+    #[error("there is a map for each of {steps} times; choose one with --select")]
+    Steps {
+        /// The number of times.
+        steps: usize,
+    },
+
+    /// A HEALPix field of which something is not known.
+    #[error("variable '{variable}' is on a HEALPix grid, but nothing says {unknown}; add it to its grid mapping")]
+    GridUnknown {
+        /// The variable.
+        variable: String,
+        /// What is not known, and the attribute that would say it.
+        unknown: &'static str,
+    },
+    /// More or fewer values than the grid has pixels.
+    #[error(
+        "variable '{variable}' has {found} values along '{dimension}', but Nside {nside} has {expected} pixels; add the coordinate healpix_index, which says which ones they are, or correct the grid mapping"
+    )]
+    CellCount {
+        /// The variable.
+        variable: String,
+        /// The dimension of cells.
+        dimension: String,
+        /// Its length.
+        found: usize,
+        /// Nside of the grid mapping.
+        nside: usize,
+        /// The number of pixels of that Nside.
+        expected: usize,
+    },
+    /// A number that no pixel or cell has.
+    #[error("'{index}' has {number} at place {place} (from 0), which is not {expected}; correct it")]
+    CellNumber {
+        /// The variable of numbers.
+        index: String,
+        /// The number.
+        number: i64,
+        /// Where it is.
+        place: usize,
+        /// What would do.
+        expected: String,
+    },
+    /// Numbers of pixels that are no whole numbers.
+    #[error("'{index}' should number pixels but holds {found}; store whole numbers")]
+    CellKind {
+        /// The variable of numbers.
+        index: String,
+        /// What it holds.
+        found: &'static str,
+    },
+    /// Two cells that are the same or share an area.
+    #[error("'{index}' has the cells {first} and {second} (UNIQ numbers), which overlap; remove one of them")]
+    CellOverlap {
+        /// The variable of numbers.
+        index: String,
+        /// One cell.
+        first: u64,
+        /// The other.
+        second: u64,
+    },
+    /// A pixel that occurs twice.
+    #[error("'{index}' names pixel {number} more than once; remove the duplicates")]
+    CellTwice {
+        /// The variable of numbers.
+        index: String,
+        /// The number.
+        number: i64,
+    },
+    /// Cells too fine to be expanded unasked.
+    #[error(
+        "the cells of '{index}' reach Nside {finest}, beyond {limit}; choose the resolution to bring them to with --nside"
+    )]
+    CellsFine {
+        /// The variable of numbers.
+        index: String,
+        /// Nside of the finest cells.
+        finest: usize,
+        /// The finest Nside that is used without being asked for.
+        limit: usize,
+    },
+    /// A resolution asked of a field that has but one.
+    #[error(
+        "variable '{variable}' has Nside {nside}, so it cannot be read at Nside {asked}; leave --nside out, or degrade the field first (for example with healpy.ud_grade)"
+    )]
+    OneResolution {
+        /// The variable.
+        variable: String,
+        /// Its Nside.
+        nside: usize,
+        /// The Nside asked for.
+        asked: usize,
+    },
+
+    /// Metadata of a Zarr store that cannot be.
+    #[error("the metadata of {node} in this Zarr store is wrong ({problem}); fetch or write the store again")]
+    ZarrMetadata {
+        /// The array, group or file.
+        node: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The Zarr library refused.
+    #[error("cannot read the array '{array}': the Zarr library says \"{message}\"; check the store with zarr-python")]
+    Zarr {
+        /// Path of the array.
+        array: String,
+        /// The library's words.
+        message: String,
+    },
+    /// An array, or a chunk of it, larger than memory.
+    #[error(
+        "the part of array '{array}' that is needed, or a chunk of it, has {gibibytes:.1} GiB, more memory than there is; select less of it, or rechunk the store"
+    )]
+    ZarrMemory {
+        /// Path of the array.
+        array: String,
+        /// The memory needed.
+        gibibytes: f64,
+    },
+
+    /// A coordinate without values.
+    #[error("the {coordinate} has no values; check the file")]
+    NoCoordinates {
+        /// Which coordinate: latitude or longitude.
+        coordinate: &'static str,
+    },
+    /// A coordinate that turns back, or stands still.
+    #[error(
+        "the {coordinate} {value} at index {index} follows {before} against the order of the other values; sort the field along it"
+    )]
+    NotMonotonic {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value before.
+        before: f64,
+        /// The value.
+        value: f64,
+    },
+    /// A coordinate, or a bound of a cell, that is not on the sphere.
+    #[error("the {coordinate} {value} at index {index} is not between {least} and {most} degrees; {remedy}")]
+    CoordinateRange {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// The least it could be.
+        least: f64,
+        /// The most it could be.
+        most: f64,
+        /// What it looks like, and what to do.
+        remedy: &'static str,
+    },
+    /// Coordinates in radians.
+    #[error("the longitudes go once around in 2π, so they look like radians; convert the coordinates to degrees")]
+    Radians,
+    /// Longitudes that go around the sphere more than once.
+    #[error("the longitudes span {span} degrees, more than the circle has; remove the columns that repeat others")]
+    LongitudeSpan {
+        /// From the first to the last.
+        span: f64,
+    },
+    /// A single value, from which no size of a cell follows.
+    #[error(
+        "the {coordinate} has the single value {value} and no bounds, so the extent of its cells is unknown; add bounds"
+    )]
+    NoSpacing {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// Bounds of cells that do not match the coordinate.
+    #[error(
+        "the {coordinate} has {points} values but {bounds} bounds, which are neither edges ({points} + 1) nor pairs (2 x {points}); correct the bounds"
+    )]
+    BoundsCount {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of values.
+        points: usize,
+        /// The number of bounds.
+        bounds: usize,
+    },
+    /// A cell that its own point is not in.
+    #[error("the {coordinate} {value} at index {index} is not within its bounds {low} and {high}; correct the bounds")]
+    BoundsApart {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of the value, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// One bound.
+        low: f64,
+        /// The other.
+        high: f64,
+    },
+    /// Cells that share an area.
+    #[error("the bounds of the {coordinate} at the indices {first} and {second} overlap; correct the bounds")]
+    BoundsOverlap {
+        /// Which coordinate.
+        coordinate: &'static str,
+        /// The number of one value, from 0.
+        first: usize,
+        /// The number of the other.
+        second: usize,
+    },
+    /// A grid beyond what weights can name.
+    #[error(
+        "a grid of {latitudes} latitudes and {longitudes} longitudes has more than 2^32 cells; select a part of it"
+    )]
+    GridSize {
+        /// The number of latitudes.
+        latitudes: usize,
+        /// The number of longitudes.
+        longitudes: usize,
+    },
+
+    /// Values that could not be made, for a reason of the one who makes them.
+    #[error("{reason}")]
+    NoResult {
+        /// The reason.
+        reason: String,
+    },
     /// A file that is not to be replaced.
     #[error("the file exists; choose another name, or overwrite it with --overwrite")]
     Exists,
@@ -382,6 +1005,27 @@ impl Error {
             io::ErrorKind::NotFound => Error::Missing,
             _ => Error::Io { action, cause },
         }
+    }
+}
+
+/// A share of a number of pixels, shown in percent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Percent {
+    /// The pixels in question.
+    pub pixels: usize,
+    /// All pixels.
+    pub of: usize,
+}
+
+impl fmt::Display for Percent {
+    /// With two digits or more, so that what is small does not look like nothing.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.pixels == 0 {
+            return f.write_str("0%");
+        }
+        let percent = 100.0 * self.pixels as f64 / self.of as f64;
+        let decimals = (1.0 - percent.log10().floor()).max(1.0) as usize;
+        write!(f, "{percent:.decimals$}%")
     }
 }
 

@@ -5,18 +5,40 @@
 //! puts a finished file in its place. What is done with a map is left to others.
 
 mod adapter;
+mod canvas;
+mod cf;
 mod cfitsio;
+mod columns;
+mod csv;
+mod dataset;
+mod directions;
 mod error;
 mod healpix;
+mod healpix_cf;
 mod healpix_fits;
+mod interpret;
+mod latlon;
+mod libnetcdf;
 mod map;
+mod multi_order;
+mod netcdf;
+mod netcdf_write;
+mod ply;
+mod points;
+mod regrid;
 mod save;
+mod surface;
+mod zarr;
+mod zarr_zstd;
 
 pub use adapter::{
-    Adapter, Description, Field, FieldDescription, Indexing, Selection, TableDescription, describe, read,
+    Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
+    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, is_store, open, read,
 };
-pub use error::Error;
+pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
-pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
-pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, UNSEEN, is_bad};
-pub use save::{check_writable, save};
+pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
+pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
+pub use regrid::{LatLon, Weights};
+pub use save::{abandon, check_writable, save};

@@ -42,6 +42,19 @@ impl CoordinateSystem {
     }
 }
 
+/// A time, as the file has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Time {
+    /// The value of the time coordinate.
+    pub value: f64,
+    /// Its unit, such as `days since 1979-01-01`.
+    pub units: String,
+    /// Its calendar, as CF names it.
+    pub calendar: String,
+    /// The date in ISO 8601, as far as it is not all zero: `1997-12-01` or `1997-12-01T06:00`.
+    pub label: String,
+}
+
 /// A scalar field on a HEALPix grid, in RING order. A pixel is masked exactly if its value is NaN.
 #[derive(Clone, Debug)]
 pub struct Map {
@@ -55,6 +68,10 @@ pub struct Map {
     pub coordinates: Option<CoordinateSystem>,
     /// The ordering of the file that the map was read from (the values here are always in RING order).
     pub ordering: Ordering,
+    /// The time of the field, where the file has one.
+    pub time: Option<Time>,
+    /// What the field is in words (`long_name`), where the file says it.
+    pub long_name: Option<String>,
 }
 
 impl Map {
@@ -69,13 +86,31 @@ impl Map {
                 *v = f64::NAN;
             }
         }
-        Ok(Map { grid, values, name: name.into(), unit: None, coordinates: None, ordering: Ordering::Ring })
+        Ok(Map {
+            grid,
+            values,
+            name: name.into(),
+            unit: None,
+            coordinates: None,
+            ordering: Ordering::Ring,
+            time: None,
+            long_name: None,
+        })
     }
 
     /// A map of values in RING order in which nothing but NaN means "no value"; one value for each pixel.
     pub(crate) fn from_masked(grid: Healpix, values: Vec<f64>) -> Self {
         debug_assert_eq!(values.len(), grid.pixels());
-        Map { grid, values, name: String::new(), unit: None, coordinates: None, ordering: Ordering::Ring }
+        Map {
+            grid,
+            values,
+            name: String::new(),
+            unit: None,
+            coordinates: None,
+            ordering: Ordering::Ring,
+            time: None,
+            long_name: None,
+        }
     }
 
     /// The grid.
@@ -86,6 +121,16 @@ impl Map {
     /// The values in RING order, NaN where masked.
     pub fn values(&self) -> &[f64] {
         &self.values
+    }
+
+    /// The values alone.
+    pub fn into_values(self) -> Vec<f64> {
+        self.values
+    }
+
+    /// The share of pixels that have a value.
+    pub(crate) fn share_valid(&self) -> f64 {
+        self.values.iter().filter(|v| !v.is_nan()).count() as f64 / self.values.len() as f64
     }
 
     /// Masks every pixel at which `mask` is below `threshold` or is itself masked.

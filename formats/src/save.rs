@@ -7,6 +7,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{TempDir, TempPath};
 
@@ -76,8 +77,44 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn temporary_folder(to: &Path) -> Result<TempDir, Error> {
+/// A folder for unfinished files, which goes with all that is in it.
+struct Temporary(TempDir);
+
+/// The folders that exist.
+static TEMPORARY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+impl Temporary {
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        folders().retain(|folder| folder != self.0.path());
+    }
+}
+
+fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
+    TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn temporary_folder(to: &Path) -> Result<Temporary, Error> {
+    let mut folders = folders();
     let made = tempfile::Builder::new().prefix(".longan-").tempdir_in(folder_of(to));
     // Without the temporary folder's own name, which tells a user nothing.
-    made.map_err(|cause| Error::Io { action: "write to its folder", cause: cause.kind().into() })
+    let made = made.map_err(|cause| Error::Io { action: "write to its folder", cause: cause.kind().into() })?;
+    folders.push(made.path().to_owned());
+    Ok(Temporary(made))
+}
+
+/// Removes all unfinished files. For a program that is about to end early: no file can be saved from then on.
+pub fn abandon() {
+    let folders = folders();
+    for folder in folders.iter() {
+        // Nobody is left to be told.
+        let _ = fs::remove_dir_all(folder);
+    }
+    // Kept locked, so that no other folder is made.
+    std::mem::forget(folders);
 }

@@ -5,15 +5,16 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Args;
-use longan::formats::{self, HealpixFile, Ordering};
+use longan::formats;
 use longan::measures::{BuiltIn, find};
 use longan::picture::{Options, Panel, panels};
 use longan::simulate::{Edge, Waves, scene, shapes};
 use longan::{Analysis, Healpix, Map, MinkowskiMaps, ThresholdUnit};
 
-use super::options::{Input, Running, shown};
+use super::options::{Running, shown};
 use super::output::Provenance;
-use super::simulate::{file, waves_cards};
+use super::simulate::{self, step, waves_cards};
+use super::sink::Step;
 
 /// Simulates maps, measures them, prints numbers that you can check, and writes maps and a picture.
 #[derive(Args, Debug)]
@@ -43,12 +44,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for name in ["shapes.fits", "shapes_evq.fits", "waves.fits", "waves_evq.fits", "waves_evq.png"] {
         formats::check_writable(&path(name), arguments.overwrite)?;
     }
-    let write = |name: &str, file: &HealpixFile| formats::write_healpix(&path(name), file, arguments.overwrite);
+    let write = |name: &str, grid: Healpix, step: Step| simulate::write(&path(name), grid, arguments.overwrite, step);
     let say = |line: String| arguments.running.say(line);
     let evq = [find("evq")?];
 
     let bodies = shapes(Healpix::new(NSIDE[0])?, &scene(), Edge::Binary);
-    write("shapes.fits", &file(&bodies, Vec::new()))?;
+    write("shapes.fits", bodies.grid(), step(&bodies, Vec::new()))?;
     let analysis = Analysis {
         thresholds: "0.5".parse()?,
         threshold_unit: ThresholdUnit::Value,
@@ -63,12 +64,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let (_, totals, _) = analysis.totals(&bodies)?;
     say(format!("  Euler characteristic {:.6}   (seven bodies, no holes)", totals[0].euler_characteristic()))?;
-    write("shapes_evq.fits", &arguments.file(maps, &bodies, "shapes.fits", &analysis, &evq))?;
+    write("shapes_evq.fits", maps.grid, minkowski(maps, &bodies, "shapes.fits", &analysis, &evq))?;
 
     let (correlation, seed) = FIELD;
     let waves = Waves::new(correlation, seed)?;
     let field = waves.map(Healpix::new(NSIDE[1])?);
-    write("waves.fits", &file(&field, waves_cards(&waves, correlation, seed)))?;
+    write("waves.fits", field.grid(), step(&field, waves_cards(&waves, correlation, seed)))?;
     let analysis = Analysis { nside_out: Some(NSIDE_OUT), ..Analysis::default() };
     let start = Instant::now();
     let maps = analysis.minkowski_maps(&field, &evq, |_| ())?.remove(0);
@@ -87,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     say(format!("  Minkowski map of Nside {NSIDE_OUT}: {seconds:.2} s"))?;
 
     let evq_values = maps.values[0].clone();
-    write("waves_evq.fits", &arguments.file(maps, &field, "waves.fits", &analysis, &evq))?;
+    write("waves_evq.fits", maps.grid, minkowski(maps, &field, "waves.fits", &analysis, &evq))?;
     let top = Options {
         title: "Gaussian field".to_owned(),
         label: "value in σ".to_owned(),
@@ -108,18 +109,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     say(format!("\nMaps and the picture waves_evq.png are in {}", shown(folder)))
 }
 
-impl Arguments {
-    fn file(
-        &self,
-        maps: MinkowskiMaps,
-        map: &Map,
-        name: &str,
-        analysis: &Analysis,
-        measures: &[BuiltIn],
-    ) -> HealpixFile {
-        let input = Input::default();
-        let command = "longan demo".to_owned();
-        let provenance = Provenance { path: name.as_ref(), map, input: &input, analysis, command };
-        provenance.file(vec![maps], measures, Ordering::Ring, false)
-    }
+/// What is written of Minkowski maps.
+fn minkowski(maps: MinkowskiMaps, map: &Map, name: &str, analysis: &Analysis, measures: &[BuiltIn]) -> Step {
+    let command = "longan demo".to_owned();
+    Provenance { path: name.as_ref(), map, input: None, analysis, command }.step(vec![maps], measures)
 }

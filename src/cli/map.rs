@@ -1,26 +1,28 @@
 //! `longan map`: Minkowski maps of one or many files.
 
-use std::collections::{BTreeMap, HashSet};
-use std::ffi::OsString;
+use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
-use longan::formats::{self, Healpix, Map, Ordering};
-use longan::measures::{CatalogueError, Measure, find, split};
-use longan::statistics::statistics;
+use longan::formats::{self, Error, Healpix, Map};
+use longan::measures::{CatalogueError, Measure, split};
+use longan::statistics::{Statistics, statistics};
 use longan::window::{Summation, Ways};
-use longan::{Analysis, MinkowskiMaps, Weight};
+use longan::{Analysis, AnalysisError, MinkowskiMaps, Weight};
 
+use super::input::{self, Input, Mask};
 use super::misused;
-use super::options::{BodyOptions, Input, Running, between, check_memory, decimals, nside, shown};
-use super::output::Provenance;
+use super::options::{BodyOptions, Running, between, check_memory, decimals, nside, shown};
+use super::output::{Provenance, command};
 use super::plugin::Plugins;
 use super::progress::Progress;
+use super::sink::{self, Kind, OutputOptions};
 
-/// Minkowski map of a HEALPix map: measures of shape in windows about the pixels of a coarser grid.
+/// Minkowski map of a field on the sphere: measures of shape in windows about the pixels of a coarser grid.
 ///
 /// Without options this is the analysis of Collischon et al. (2024): the eigenvalue quotient EVQ in windows of 6
 /// degrees, averaged over 13 thresholds from -3 to 3 standard deviations, at Nside 16.
@@ -34,13 +36,18 @@ Examples:
   longan map rain.fits -o out.fits --thresholds log:0.1:100:7 --window 4 --nside-out 64
   longan map sky.fits -o out.fits --nside-out 512 --window 4,6,10 --verbose
   longan map sims/*.fits -o maps/ --resume
+  longan map era5.nc -o evq.nc --variable z --select level=500 --select time=1997-12
+  longan map stations.csv -o evq.fits --variable rain --gather gaussian:5
+  longan map cell.ply -o evq.fits --variable signal --window 15
 
-The output opens in healpy: healpy.read_map('evq.fits'). Masked and undefined pixels are UNSEEN.")]
+FITS opens in healpy: healpy.read_map('evq.fits'); masked and undefined pixels are UNSEEN. NetCDF opens in xarray;
+they are NaN there. A field with several times makes an extension each, in NetCDF an axis of time.")]
 pub(crate) struct Arguments {
-    /// HEALPix files.
+    /// Files of maps: FITS, NetCDF, Zarr, CSV, PLY.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// File to write; for several inputs a folder, which gets a file of the same name for each.
+    /// File to write, FITS (.fits, .fits.gz) or NetCDF (.nc); for several inputs a folder, which gets a file of the same
+    /// name for each (.fits in place of .csv or .ply, .nc in place of .zarr or .h5).
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
@@ -51,7 +58,7 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     plugins: Plugins,
     /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside. Several, such as
-    /// 4,6,10, make an extension each.
+    /// 4,6,10, make an extension each, in NetCDF variables such as EVQ_WINDOW_4.
     #[arg(long, value_name = "DEG,...", default_value = "6", value_delimiter = ',')]
     #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
     window: Vec<f64>,
@@ -61,7 +68,8 @@ pub(crate) struct Arguments {
     /// Weight of the contour's pieces in tensors: their length (W_1) or their curvature (W_2).
     #[arg(long, value_name = "WEIGHT", default_value = "length")]
     weight: WeightOption,
-    /// Write one extension for each threshold instead of the mean over thresholds.
+    /// Write one extension, in NetCDF variables such as EVQ_THRESHOLD_1, for each threshold instead of the mean over
+    /// thresholds.
     #[arg(long)]
     sequence: bool,
     /// Windows with a larger share of masked cells than this, from 0 to 1, are masked.
@@ -80,15 +88,8 @@ pub(crate) struct Arguments {
     body: BodyOptions,
     #[command(flatten)]
     input: Input,
-    /// Ordering of the output [default: the input's].
-    #[arg(long, value_name = "ORDERING", help_heading = "Output")]
-    ordering: Option<OrderingOption>,
-    /// Write single precision.
-    #[arg(long, help_heading = "Output")]
-    float32: bool,
-    /// Replace existing outputs.
-    #[arg(long, help_heading = "Output")]
-    overwrite: bool,
+    #[command(flatten)]
+    output_options: OutputOptions,
     /// Skip inputs whose output exists, to go on with an interrupted run.
     #[arg(long, help_heading = "Output", conflicts_with = "overwrite")]
     resume: bool,
@@ -108,21 +109,14 @@ enum WeightOption {
     Curvature,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OrderingOption {
-    Ring,
-    #[value(alias = "nest")]
-    Nested,
-}
-
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let measures = arguments.measures()?;
     let jobs = arguments.jobs()?;
-    let mask = arguments.input.read_mask()?;
+    let mut mask = arguments.input.mask()?;
     let mut failed = Vec::new();
     for (input, output) in &jobs {
-        if let Err(error) = arguments.one(input, output, mask.as_ref(), &measures) {
+        if let Err(error) = arguments.one(input, output, mask.as_mut(), &measures) {
             if jobs.len() == 1 {
                 return Err(error);
             }
@@ -165,7 +159,7 @@ impl Arguments {
             return Err(misused("map", problem));
         }
         if measures.is_empty() {
-            measures.push(Arc::new(find("evq")?));
+            measures.push(catalogue.find("longan:evq")?);
         }
         Ok(measures)
     }
@@ -175,6 +169,11 @@ impl Arguments {
         let out = &self.output;
         let into_folder = self.inputs.len() > 1 || out.is_dir() || out.to_string_lossy().ends_with('/');
         ensure!(
+            !formats::is_store(out),
+            "{}: this is a Zarr store, not a folder for outputs; choose another name",
+            shown(out)
+        );
+        ensure!(
             !into_folder || !out.is_file(),
             "{}: this is a file where a folder is needed; choose another name",
             shown(out)
@@ -183,7 +182,7 @@ impl Arguments {
         let mut jobs = Vec::new();
         for input in &self.inputs {
             let output = match input.file_name() {
-                Some(name) if into_folder => out.join(name),
+                Some(_) if into_folder => out.join(Kind::name_for(input)),
                 None if into_folder => bail!("{}: this is not a file; name files", shown(input)),
                 _ => out.clone(),
             };
@@ -213,7 +212,8 @@ impl Arguments {
             }
         }
         for (_, output) in &jobs {
-            formats::check_writable(output, self.overwrite)?;
+            Kind::of(output)?;
+            formats::check_writable(output, self.output_options.overwrite)?;
         }
         Ok(jobs)
     }
@@ -232,65 +232,122 @@ impl Arguments {
         }
     }
 
-    fn one(&self, path: &Path, output: &Path, mask: Option<&Map>, measures: &[Arc<dyn Measure>]) -> anyhow::Result<()> {
+    fn one(
+        &self,
+        path: &Path,
+        output: &Path,
+        mut mask: Option<&mut Mask>,
+        measures: &[Arc<dyn Measure>],
+    ) -> anyhow::Result<()> {
         let start = Instant::now();
-        let map = self.input.read(path, mask)?;
+        let mut series = self.input.open(path)?;
+        let steps = series.steps();
+        let mut first = Some(series.read(0, mask.as_deref_mut())?);
         let analysis = self.analysis();
         let about = || shown(path);
+        let kind = Kind::of(output)?;
+        let map = first.iter().next().context("a map")?;
         let grid = analysis.check(map.grid()).with_context(about)?;
-        let ordering = self.ordering_for(&map, grid).with_context(about)?;
-        let extensions = analysis.windows.len() * if self.sequence { analysis.thresholds.values().len() } else { 1 };
-        check_memory(grid, extensions * measures.len()).with_context(about)?;
+        let layout = self.output_options.layout(map, grid, kind, steps).with_context(about)?;
+        let tables = analysis.windows.len() * if self.sequence { analysis.thresholds.values().len() } else { 1 };
+        check_memory(grid, tables * measures.len()).with_context(about)?;
         let progress = Progress::new(about(), self.running.quiet);
-        let maps = if self.sequence {
-            analysis.sequence(&map, measures, |share| progress.set(share))
-        } else {
-            analysis.minkowski_maps(&map, measures, |share| progress.set(share))
-        }
-        .with_context(about)?;
+        let command = command(&self.inputs, path);
+        let mut summary = Summary::default();
+        let mut ways = Vec::new();
+        let mut empty = Vec::new();
+        sink::write(output, kind, layout, self.output_options.overwrite, |step| {
+            let map = match first.take() {
+                Some(map) => map,
+                None => series.read(step, mask.as_deref_mut())?,
+            };
+            let told = |share| progress.set((step as f64 + share) / steps as f64);
+            let maps = match self.sequence {
+                true => analysis.sequence(&map, measures, told),
+                false => analysis.minkowski_maps(&map, measures, told),
+            };
+            let maps = match maps {
+                Err(AnalysisError::AllMasked | AnalysisError::Constant { .. }) if steps > 1 => {
+                    empty.push(map.time.as_ref().map(|time| time.label.clone()).unwrap_or_default());
+                    undefined(&analysis, &map, grid, tables, measures.len())
+                }
+                maps => maps.map_err(|e| {
+                    let when = map.time.as_ref().filter(|_| steps > 1).map(|time| format!("at {}: ", time.label));
+                    input::of(path, Error::NoResult { reason: format!("{}{e}", when.unwrap_or_default()) })
+                })?,
+            };
+            if step == 0 {
+                ways = maps.iter().map(explained).collect();
+            }
+            summary.add(&maps[0].values[0]);
+            let input = Some(&self.input);
+            Ok(Provenance { path, map: &map, input, analysis: &analysis, command: command.clone() }
+                .step(maps, measures))
+        })?;
         drop(progress);
         if self.verbose {
-            maps.iter().try_for_each(|maps| self.running.say(explained(maps)))?;
+            ways.into_iter().try_for_each(|way| self.running.say(way))?;
         }
-        let summary = summary(&measures[0].column(), &maps[0].values[0], maps[0].grid);
-        let provenance =
-            Provenance { path, map: &map, input: &self.input, analysis: &analysis, command: self.command(path) };
-        let file = provenance.file(maps, measures, ordering, self.float32);
-        formats::write_healpix(output, &file, self.overwrite)?;
-        self.running.say(format_args!("{}: {summary} ({:.2} s)", shown(output), start.elapsed().as_secs_f64()))
-    }
-
-    fn ordering_for(&self, map: &Map, grid: Healpix) -> anyhow::Result<Ordering> {
-        let ordering = match self.ordering {
-            Some(OrderingOption::Ring) => Ordering::Ring,
-            Some(OrderingOption::Nested) => Ordering::Nested,
-            None => map.ordering,
-        };
-        if ordering == Ordering::Nested && !grid.has_nested() {
-            bail!("an output Nside of {} is not a power of two, which NESTED needs; add --ordering ring", grid.nside());
+        if let Some(one) = empty.first() {
+            let (about, n) = (about(), empty.len());
+            let others = if n > 1 { format!(" and {} other steps", n - 1) } else { String::new() };
+            self.running.warn(format_args!(
+                "{about}: the map at {one}{others} is masked or constant, so the result is masked there"
+            ));
         }
-        Ok(ordering)
-    }
-
-    /// The command that makes this output: as given, with this input only.
-    fn command(&self, input: &Path) -> String {
-        let others: HashSet<_> = self.inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
-        let words: Vec<_> = std::env::args_os().collect();
-        // A mask may be an input too.
-        let kept = |pair: &&[OsString]| ["-m", "--mask"].iter().any(|m| pair[0] == *m) || !others.contains(&*pair[1]);
-        let words: Vec<_> = words.windows(2).filter(kept).map(|pair| pair[1].to_string_lossy()).collect();
-        let quoted = shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_else(|_| words.join(" "));
-        format!("longan {quoted}")
+        let of = if steps > 1 { format!("{steps} steps of ") } else { String::new() };
+        let all = format!("{of}{} of Nside {}", measures[0].column(), grid.nside());
+        let seconds = start.elapsed().as_secs_f64();
+        self.running.say(format_args!("{}: {all} {summary} ({seconds:.2} s)", shown(output)))
     }
 }
 
-/// What the first column holds, in a few words.
-fn summary(column: &str, values: &[f64], grid: Healpix) -> String {
-    let all = format!("{column} of Nside {}", grid.nside());
-    let Some(s) = statistics(values) else { return format!("{all} is masked or undefined everywhere") };
-    let [min, max, mean] = [s.min, s.max, s.mean].map(|x| decimals(x, 4));
-    let (without, pixels) = (values.len() - s.unmasked, values.len());
-    format!("{all} from {min} to {max}, mean {mean}, {without} of {pixels} pixels masked or undefined")
+/// The result for a map that has no shape to measure: nothing but masked pixels.
+fn undefined(analysis: &Analysis, map: &Map, grid: Healpix, tables: usize, measures: usize) -> Vec<MinkowskiMaps> {
+    let nothing = Statistics { unmasked: 0, min: f64::NAN, max: f64::NAN, mean: f64::NAN, sigma: f64::NAN };
+    let each = tables / analysis.windows.len();
+    let of = |window: &f64| MinkowskiMaps {
+        grid,
+        window: *window,
+        thresholds: analysis.thresholds.clone(),
+        of_map: statistics(map.values()).unwrap_or(nothing),
+        values: vec![vec![f64::NAN; grid.pixels()]; measures],
+        ways: Ways::default(),
+    };
+    analysis.windows.iter().flat_map(|window| std::iter::repeat_n(of(window), each)).collect()
+}
+
+/// What maps hold, in a few words.
+#[derive(Default)]
+pub(crate) struct Summary {
+    /// Of all maps so far.
+    of_all: Option<Statistics>,
+    pixels: usize,
+}
+
+impl Summary {
+    /// Takes one more map into account.
+    pub(crate) fn add(&mut self, values: &[f64]) {
+        self.pixels += values.len();
+        let Some(new) = statistics(values) else { return };
+        self.of_all = Some(match self.of_all {
+            None => new,
+            Some(old) => {
+                let unmasked = old.unmasked + new.unmasked;
+                let mean = (old.mean * old.unmasked as f64 + new.mean * new.unmasked as f64) / unmasked as f64;
+                Statistics { unmasked, mean, min: old.min.min(new.min), max: old.max.max(new.max), ..new }
+            }
+        });
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(s) = self.of_all else { return f.write_str("is masked or undefined everywhere") };
+        let [min, max, mean] = [s.min, s.max, s.mean].map(|x| decimals(x, 4));
+        let (without, pixels) = (self.pixels - s.unmasked, self.pixels);
+        write!(f, "from {min} to {max}, mean {mean}, {without} of {pixels} pixels masked or undefined")
+    }
 }
 
 /// How the windows of a map were summed, and why.
@@ -299,8 +356,11 @@ fn explained(maps: &MinkowskiMaps) -> String {
     let mut ways = Vec::new();
     let all = (direct + missed + prefix).max(1) as f64;
     let mut way = |pairs: usize, how: String| {
-        if pairs > 0 {
-            ways.push(format!("{} % {how}", decimals(100.0 * pairs as f64 / all, 1)));
+        let percent = 100.0 * pairs as f64 / all;
+        match pairs {
+            0 => (),
+            _ if percent < 0.1 => ways.push(format!("less than 0.1 % {how}")),
+            _ => ways.push(format!("{percent:.1} % {how}")),
         }
     };
     way(prefix, format!("from prefix sums with up to {terms} terms, psi_s to {error:.1e} of W1"));

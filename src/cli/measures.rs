@@ -22,7 +22,7 @@ brackets; and these functions, with angles in radians:
   atan2 hypot max min, of two
 
 As in mathematics, -2^2 is -4 and 2^3^2 is 2^9. Where a measure is undefined, or a step has no finite number, so is the \
-formula. The header of the output keeps it as FORMULA1, FORMULA2 and so on.
+formula. The header of the output keeps it as FORMULA1, FORMULA2 and so on, which are attributes in NetCDF.
 
 Plugins: libraries with measures of one's own, in C or Rust, named by --plugin or lying in a folder of the environment \
 variable LONGAN_PLUGIN_PATH. A measure whose name others have too is named with its plugin, as in example:evq, and a \

@@ -1,17 +1,21 @@
 //! Commands, one file each, and how they end.
 //!
 //! Exit status: 0 all done; 1 a file could not be read, analysed or written (others of the run may be done); 2 the
-//! arguments make no sense.
+//! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
+//! file.
 
 mod demo;
 mod info;
+mod input;
 mod map;
 mod measures;
 mod options;
 mod output;
 mod plugin;
 mod progress;
+mod regrid;
 mod simulate;
+mod sink;
 mod totals;
 
 use std::io::Write;
@@ -20,7 +24,9 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
-/// Shape on the sphere: Minkowski functionals and tensors of HEALPix maps, in moving windows.
+/// Shape on the sphere: Minkowski functionals and tensors of maps and other fields, in moving windows.
+///
+/// Reads HEALPix in FITS, NetCDF and Zarr, latitude-longitude grids in NetCDF and Zarr, points in CSV, surfaces in PLY.
 #[derive(Parser)]
 #[command(version, arg_required_else_help = true, subcommand_required = true, propagate_version = true)]
 #[command(after_help = "\
@@ -29,7 +35,9 @@ Examples:
   longan info sky.fits                   what a file holds
   longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
   longan map sims/*.fits -o maps/        many maps, one output each
+  longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
+  longan regrid stations.csv -o rainfall.fits --variable rain
   longan plugin new beta                 a crate in Rust for a measure of one's own
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
@@ -44,6 +52,7 @@ enum Command {
     Map(map::Arguments),
     Totals(totals::Arguments),
     Info(info::Arguments),
+    Regrid(regrid::Arguments),
     Measures(measures::Arguments),
     Plugin(plugin::Arguments),
     Simulate(simulate::Arguments),
@@ -52,10 +61,13 @@ enum Command {
 
 /// Runs the program.
 pub(crate) fn main() -> ExitCode {
+    #[cfg(unix)]
+    clean_up_when_stopped();
     let done = match Arguments::parse().command {
         Command::Map(arguments) => map::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),
         Command::Plugin(arguments) => plugin::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
@@ -82,4 +94,18 @@ fn misused(command: &str, problem: String) -> anyhow::Error {
     arguments.build();
     let command = arguments.find_subcommand_mut(command).expect("a command of this program");
     command.error(ErrorKind::ValueValidation, problem).into()
+}
+
+/// Removes unfinished files when the program is told to end, and then ends it in the way of that signal.
+#[cfg(unix)]
+fn clean_up_when_stopped() {
+    use signal_hook::consts::TERM_SIGNALS;
+    // Without it, as before a file is written, the signals end the program by themselves.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(TERM_SIGNALS) else { return };
+    std::thread::spawn(move || {
+        if let Some(signal) = signals.forever().next() {
+            longan::formats::abandon();
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
+    });
 }

@@ -2,55 +2,13 @@
 
 use std::fmt::Display;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use longan::formats::{self, Field, Healpix, Map, Selection};
+use longan::formats::Healpix;
 use longan::{Analysis, Body, ThresholdUnit, Thresholds};
-
-/// Which field of a file, and which pixels of it.
-#[derive(Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Input")]
-pub(crate) struct Input {
-    /// Field: a column's name, or its number counted from 0 as healpy does [default: the first].
-    #[arg(long, value_name = "NAME|NUMBER", value_parser = field)]
-    pub(crate) field: Option<Field>,
-    /// Number of the FITS extension, 0 for the primary one [default: the first with a map].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
-    pub(crate) hdu: Option<usize>,
-    /// For multi-order (UNIQ) files: Nside to bring the map to [default: that of its finest cells].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
-    pub(crate) nside: Option<usize>,
-    /// Mask file, of any ordering and number type; pixels below the mask threshold are left out.
-    #[arg(long, short, value_name = "FILE")]
-    pub(crate) mask: Option<PathBuf>,
-    /// Field of the mask file [default: the first].
-    #[arg(long, value_name = "NAME|NUMBER", requires = "mask", value_parser = field)]
-    pub(crate) mask_field: Option<Field>,
-    /// Pixels whose mask value is below this are masked.
-    #[arg(long, value_name = "X", default_value_t = 0.9, allow_negative_numbers = true, value_parser = finite)]
-    pub(crate) mask_threshold: f64,
-}
-
-impl Input {
-    /// The mask, if there is one.
-    pub(crate) fn read_mask(&self) -> anyhow::Result<Option<Map>> {
-        let selection = Selection { field: self.mask_field.clone(), ..Selection::default() };
-        Ok(self.mask.as_deref().map(|path| formats::read(path, &selection)).transpose()?)
-    }
-
-    /// The field, masked.
-    pub(crate) fn read(&self, path: &Path, mask: Option<&Map>) -> anyhow::Result<Map> {
-        let selection = Selection { field: self.field.clone(), hdu: self.hdu, nside: self.nside };
-        let mut map = formats::read(path, &selection)?;
-        if let Some(mask) = mask {
-            map.apply_mask(mask, self.mask_threshold).with_context(|| shown(path))?;
-        }
-        Ok(map)
-    }
-}
 
 /// Thresholds and the body that they cut out.
 #[derive(Args, Clone, Debug)]
@@ -178,10 +136,6 @@ pub(crate) fn check_memory(grid: Healpix, count: usize) -> anyhow::Result<()> {
         grid.nside()
     );
     Ok(())
-}
-
-fn field(text: &str) -> Result<Field, std::convert::Infallible> {
-    text.parse()
 }
 
 /// A whole number from 0.

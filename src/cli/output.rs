@@ -1,21 +1,24 @@
-//! Minkowski maps as FITS files: columns, and in the header what was done.
+//! Minkowski maps as they are written: columns, and in headers and attributes what was done.
 
-use std::path::Path;
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
-use longan::formats::{Card, CardValue, Column, CoordinateSystem, Extension, HealpixFile, Map, Ordering};
+use longan::formats::{Card, CardValue, Map, NetcdfColumn};
 use longan::measures::{Measure, Origin};
 use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
 
-use super::options::Input;
+use super::input::Input;
+use super::sink::{MapColumn, Step, Table};
 
-/// What is said in the header about a map and its analysis.
+/// What is said in headers about a map and its analysis.
 pub(crate) struct Provenance<'a> {
     /// The input file.
     pub(crate) path: &'a Path,
     /// The field analysed.
     pub(crate) map: &'a Map,
     /// Where it came from.
-    pub(crate) input: &'a Input,
+    pub(crate) input: Option<&'a Input>,
     /// What was done with it.
     pub(crate) analysis: &'a Analysis,
     /// The command that did it.
@@ -71,14 +74,8 @@ fn numbered(keyword: &str, number: usize) -> String {
 }
 
 impl Provenance<'_> {
-    /// A file of these maps, one extension each.
-    pub(crate) fn file(
-        &self,
-        maps: Vec<MinkowskiMaps>,
-        measures: &[impl AsRef<dyn Measure>],
-        ordering: Ordering,
-        float32: bool,
-    ) -> HealpixFile {
+    /// What is written of the Minkowski maps of one step.
+    pub(crate) fn step(&self, maps: Vec<MinkowskiMaps>, measures: &[impl AsRef<dyn Measure>]) -> Step {
         let windows = self.analysis.windows.len();
         let thresholds = maps.len() / windows;
         let name = |i: usize, window: f64| match (windows, thresholds) {
@@ -87,42 +84,99 @@ impl Provenance<'_> {
             (_, 1) => format!("WINDOW {window}"),
             (_, _) => format!("WINDOW {window} THRESHOLD {}", i % thresholds + 1),
         };
-        let grid = maps[0].grid;
-        let extensions = maps.into_iter().enumerate().map(|(i, maps)| {
-            let name = name(i, maps.window);
-            let cards = [self.cards(&maps), origins(measures)].concat();
-            let columns = measures.iter().map(AsRef::as_ref).zip(maps.values);
-            Extension {
-                name,
-                cards,
-                history: Vec::new(),
-                columns: columns
-                    .map(|(measure, values)| Column { name: measure.column(), unit: measure.unit().to_owned(), values })
+        let origins = origins(measures);
+        let attributes = [self.attributes(&maps, thresholds > 1), origins.clone()].concat();
+        let numbers = self.numbers(&maps[0]);
+        let tables = maps.into_iter().enumerate().map(|(i, maps)| {
+            let of = self.words(&maps, (thresholds > 1).then_some(i % thresholds));
+            Table {
+                name: name(i, maps.window),
+                cards: [self.cards(&maps), origins.clone()].concat(),
+                columns: std::iter::zip(measures.iter().map(AsRef::as_ref), maps.values)
+                    .map(|(measure, values)| MapColumn {
+                        name: measure.column(),
+                        unit: measure.unit().to_owned(),
+                        long_name: match measure.origin() {
+                            Origin::Formula(formula) => formula,
+                            Origin::Program | Origin::Plugin(_) => format!("{} {of}", measure.definition()),
+                        },
+                        values,
+                    })
                     .collect(),
             }
         });
-        HealpixFile { grid, ordering, coordinates: self.coordinates(), float32, extensions: extensions.collect() }
+        Step { time: self.map.time.clone(), tables: tables.collect(), attributes, numbers }
     }
 
-    fn coordinates(&self) -> Option<CoordinateSystem> {
-        self.map.coordinates
+    /// Of what a map is, in words: the window, and the threshold if it is of one.
+    fn words(&self, maps: &MinkowskiMaps, threshold: Option<usize>) -> String {
+        let window = match maps.window {
+            0.0 => "of each pixel".to_owned(),
+            window => format!("in windows of {window} degrees"),
+        };
+        match threshold {
+            Some(i) => format!("{window}, at {}", self.thresholds(&self.analysis.thresholds.values()[i..=i])),
+            None => window,
+        }
+    }
+
+    /// Thresholds as they were asked for.
+    fn thresholds(&self, values: &[f64]) -> String {
+        let unit = match (self.analysis.threshold_unit, &self.map.unit) {
+            (ThresholdUnit::Sigma, _) => " sigma",
+            (_, Some(unit)) => &format!(" {unit}"),
+            (_, None) => "",
+        };
+        let values: Vec<_> = values.iter().map(f64::to_string).collect();
+        format!("{}{unit}", values.join(", "))
+    }
+
+    /// Whether thresholds depend on the map's mean and scatter.
+    fn of_the_step(&self) -> bool {
+        self.map.time.is_some() && self.analysis.threshold_unit == ThresholdUnit::Sigma
+    }
+
+    /// What is said of a file as a whole: the entries of the first table, but for what differs between tables or steps.
+    fn attributes(&self, maps: &[MinkowskiMaps], sequence: bool) -> Vec<Card> {
+        let windows: Vec<_> = self.analysis.windows.iter().map(f64::to_string).collect();
+        let mut cards = vec![text("TITLE", format!("Minkowski map of {}", self.map.name), "")];
+        for card in self.cards(&maps[0]) {
+            let of_input = ["INMEAN", "INSIGMA"].contains(&&*card.key);
+            let of_thresholds =
+                card.key == "NTHRESH" || card.key.strip_prefix("THR").is_some_and(|n| n.parse::<u32>().is_ok());
+            cards.push(match card.key.as_str() {
+                _ if of_input && self.map.time.is_some() => continue,
+                _ if of_thresholds && (sequence || self.of_the_step()) => continue,
+                "WINDOW" if windows.len() > 1 => text("WINDOW", windows.join(", "), ""),
+                "PSIERROR" => real("PSIERROR", maps.iter().map(|m| m.ways.error).fold(0.0, f64::max), ""),
+                "COMMAND" => text("HISTORY", self.command.clone(), ""),
+                _ => card,
+            });
+        }
+        cards.push(text("THRESHOLDS", self.thresholds(self.analysis.thresholds.values()), ""));
+        cards
+    }
+
+    /// The numbers that each step has by itself.
+    fn numbers(&self, maps: &MinkowskiMaps) -> Vec<(NetcdfColumn, f64)> {
+        if self.map.time.is_none() {
+            return Vec::new();
+        }
+        let number = |name: &str, what: &str, value: f64| {
+            let (name, long_name) = (name.to_owned(), format!("{what} of the unmasked pixels of {}", self.map.name));
+            (NetcdfColumn { name, unit: self.map.unit.clone().unwrap_or_default(), long_name }, value)
+        };
+        vec![
+            number("input_mean", "mean", maps.of_map.mean),
+            number("input_sigma", "standard deviation", maps.of_map.sigma),
+        ]
     }
 
     fn cards(&self, maps: &MinkowskiMaps) -> Vec<Card> {
         let (map, analysis, thresholds) = (self.map, self.analysis, maps.thresholds.values());
-        let mut cards = vec![
-            creator(),
-            text("INFILE", self.path.to_string_lossy(), "file analysed"),
-            text("INFIELD", map.name.clone(), "field analysed"),
-            text("INUNIT", map.unit.clone().unwrap_or_default(), "its unit"),
-            integer("INNSIDE", map.grid().nside(), "its Nside"),
-        ];
-        if let Some(mask) = &self.input.mask {
-            cards.push(text("MASKFILE", mask.to_string_lossy(), "mask"));
-            if let Some(field) = &self.input.mask_field {
-                cards.push(text("MASKFLD", field.to_string().trim_matches('\''), "field of the mask"));
-            }
-            cards.push(real("MASKTHR", self.input.mask_threshold, "masked below this mask value"));
+        let mut cards = input_cards(self.path, map);
+        if let Some(input) = self.input {
+            cards.extend(mask_cards(input));
         }
         cards.extend([
             real("INMEAN", maps.of_map.mean, "mean of the unmasked pixels"),
@@ -143,10 +197,45 @@ impl Provenance<'_> {
             ),
             integer("NTHRESH", thresholds.len(), "number of thresholds averaged over"),
         ]);
-        for (i, threshold) in thresholds.iter().enumerate() {
+        // Without scatter there are no multiples of it.
+        let known = analysis.threshold_unit == ThresholdUnit::Value || maps.of_map.sigma > 0.0;
+        for (i, threshold) in thresholds.iter().enumerate().filter(|_| known) {
             cards.push(real(&format!("THR{}", i + 1), *threshold, "threshold, in the unit of the field"));
         }
         cards.push(text("COMMAND", self.command.clone(), "command that made this file"));
         cards
     }
+}
+
+/// What is said of the map that a file is made of.
+pub(crate) fn input_cards(path: &Path, map: &Map) -> Vec<Card> {
+    vec![
+        creator(),
+        text("INFILE", path.to_string_lossy(), "file analysed"),
+        text("INFIELD", map.name.clone(), "field analysed"),
+        text("INUNIT", map.unit.clone().unwrap_or_default(), "its unit"),
+        integer("INNSIDE", map.grid().nside(), "its Nside"),
+    ]
+}
+
+/// What is said of its mask, if there is one.
+pub(crate) fn mask_cards(input: &Input) -> Vec<Card> {
+    let Some(mask) = &input.mask else { return Vec::new() };
+    let mut cards = vec![text("MASKFILE", mask.to_string_lossy(), "mask")];
+    if let Some(field) = &input.mask_field {
+        cards.push(text("MASKFLD", field.to_string().trim_matches('\''), "field of the mask"));
+    }
+    cards.push(real("MASKTHR", input.mask_threshold, "masked below this mask value"));
+    cards
+}
+
+/// The command that makes an output of this input: as given, without the other inputs.
+pub(crate) fn command(inputs: &[PathBuf], input: &Path) -> String {
+    let others: HashSet<_> = inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
+    let words: Vec<_> = std::env::args_os().collect();
+    // A mask may be an input too.
+    let kept = |pair: &&[OsString]| ["-m", "--mask"].iter().any(|m| pair[0] == *m) || !others.contains(&*pair[1]);
+    let words: Vec<_> = words.windows(2).filter(kept).map(|pair| pair[1].to_string_lossy()).collect();
+    let quoted = shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_else(|_| words.join(" "));
+    format!("longan {quoted}")
 }

@@ -18,7 +18,18 @@ impl Progress {
 
     /// Shows the share done, from 0 to 1.
     pub(crate) fn set(&self, share: f64) {
+        give_back();
         self.0.set_position((share * STEPS) as u64);
+    }
+}
+
+/// Returns to the system what finished windows took. GNU's allocator would keep it until the end, when the whole output
+/// needs the room.
+fn give_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: the function only releases pages that nothing is allocated in; it may be called at any time.
+    unsafe {
+        libc::malloc_trim(0);
     }
 }
 

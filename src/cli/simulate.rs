@@ -1,14 +1,15 @@
 //! `longan simulate`: maps whose shape is known.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use longan::formats::{self, Card, Column, Extension, Healpix, HealpixFile, Map, Ordering};
+use longan::formats::{self, Card, Error, Healpix, Map, Ordering};
 use longan::simulate::{Body, Edge, Shape, Waves, scene, shapes};
 
 use super::options::{Running, acute, between, check_memory, finite, nside, shown, whole};
 use super::output::{creator, integer, real, text};
+use super::sink::{self, Kind, Layout, MapColumn, Step, Table};
 
 /// A map whose shape is known: bodies of simple outline, or a Gaussian random field.
 #[derive(Args, Debug)]
@@ -31,7 +32,7 @@ enum What {
 /// Where the map goes.
 #[derive(Args, Debug)]
 struct Output {
-    /// FITS file to write.
+    /// File to write, FITS (.fits, .fits.gz) or NetCDF (.nc).
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Nside of the map.
@@ -150,32 +151,38 @@ pub(crate) fn waves_cards(waves: &Waves, correlation: f64, seed: u64) -> Vec<Car
     ]
 }
 
-/// A file of one map.
-pub(crate) fn file(map: &Map, mut cards: Vec<Card>) -> HealpixFile {
+/// What is written of a map.
+pub(crate) fn step(map: &Map, mut cards: Vec<Card>) -> Step {
     cards.insert(0, creator());
-    let column = Column {
+    let column = MapColumn {
         name: map.name.to_uppercase(),
         unit: map.unit.clone().unwrap_or_default(),
+        long_name: String::new(),
         values: map.values().to_vec(),
     };
-    let extension = Extension { name: "SIMULATION".to_owned(), cards, history: Vec::new(), columns: vec![column] };
-    HealpixFile {
-        grid: map.grid(),
-        ordering: Ordering::Ring,
-        coordinates: None,
-        float32: false,
-        extensions: vec![extension],
-    }
+    let attributes = cards.clone();
+    let table = Table { name: "SIMULATION".to_owned(), cards, columns: vec![column] };
+    Step { time: None, tables: vec![table], attributes, numbers: Vec::new() }
+}
+
+/// Writes one step in RING order.
+pub(crate) fn write(path: &Path, grid: Healpix, overwrite: bool, step: Step) -> anyhow::Result<()> {
+    let layout = Layout { grid, ordering: Ordering::Ring, coordinates: None, float32: false, steps: 1 };
+    let mut step = Some(step);
+    // There is one step, so that this is called once.
+    let make = |_| step.take().ok_or_else(|| Error::NoResult { reason: "there is but one map".to_owned() });
+    Ok(sink::write(path, Kind::of(path)?, layout, overwrite, make)?)
 }
 
 impl Output {
     fn write(&self, make: impl FnOnce(Healpix) -> Map, cards: Vec<Card>) -> anyhow::Result<()> {
         self.running.start()?;
+        Kind::of(&self.output)?;
         formats::check_writable(&self.output, self.overwrite)?;
         let grid = Healpix::new(self.nside)?;
         check_memory(grid, 2).with_context(|| shown(&self.output))?;
         let map = make(grid);
-        formats::write_healpix(&self.output, &file(&map, cards), self.overwrite)?;
+        write(&self.output, grid, self.overwrite, step(&map, cards))?;
         self.running.say(format_args!("{}: {} at Nside {}", shown(&self.output), map.name, self.nside))
     }
 }

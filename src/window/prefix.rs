@@ -17,7 +17,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::reach::{OutputRing, Reached};
 use super::{Block, Summation, Sums, Ways, direct};
-use crate::moments::{Layout, RingMoments};
+use crate::moments::Layout;
 use crate::transport::RingTransport;
 use fit::Terms;
 
@@ -46,41 +46,57 @@ struct Rank {
     factors: Vec<f64>,
 }
 
-impl Plan {
-    /// A plan for the block, where prefix sums cost less than the direct sum and meet the tolerance.
-    pub(super) fn new(block: &Block<'_>, layout: &Layout, summation: Summation) -> Option<Plan> {
+/// The way in which a block is to be summed.
+pub(super) enum Way {
+    /// From prefix sums.
+    Prefix(Plan),
+    /// Pixel by pixel, which costs less or is asked for.
+    Direct,
+    /// Pixel by pixel, since no fit meets the tolerance.
+    Missed,
+}
+
+impl Way {
+    /// The cheapest way to meet the tolerance.
+    pub(super) fn find(block: &Block<'_>, layout: &Layout, summation: Summation) -> Way {
         let (tolerance, worthwhile) = match summation {
-            Summation::Exact => return None,
+            Summation::Exact => return Way::Direct,
             Summation::Tolerance(tolerance) => (tolerance, WORTHWHILE),
             Summation::Prefix(tolerance) => (tolerance, f64::INFINITY),
         };
-        let width = block.pairs().map(|(_, r)| r.half_width).max_by(f64::total_cmp)?;
+        let Some(width) = block.pairs().map(|(_, r)| r.half_width).max_by(f64::total_cmp) else { return Way::Direct };
         let budget = if worthwhile.is_finite() { worthwhile * direct_cost(block, layout) } else { f64::INFINITY };
         if cost(block, layout, layout.ranks.len() * fit::FEWEST, width) > budget {
-            return None;
+            return Way::Direct;
         }
         let sample = sample(block);
         let terms: Option<Vec<Terms>> =
             layout.ranks.iter().map(|&rank| Terms::new(rank, width, &sample, tolerance)).collect();
-        let terms = terms?;
+        let Some(terms) = terms else { return Way::Missed };
         if cost(block, layout, terms.iter().map(Terms::count).sum(), width) > budget {
-            return None;
+            return Way::Direct;
         }
-        let mut plan = Plan::with(terms, width, block.reached.len());
-        for (i, reached) in block.reached.iter().enumerate() {
-            let Some(reached) = reached else { continue };
-            let error = plan.ranks.iter_mut().map(|rank| rank.fit(i, &reached.transport)).fold(0.0, f64::max);
-            plan.fits[i] = Some(error <= tolerance);
-            if error <= tolerance {
-                plan.error = plan.error.max(error);
-            }
-        }
-        Some(plan)
+        Way::Prefix(Plan::new(terms, width, &block.reached, tolerance))
     }
+}
 
-    fn with(terms: Vec<Terms>, width: f64, pairs: usize) -> Plan {
-        let ranks = terms.into_iter().map(|terms| Rank { factors: vec![0.0; 2 * terms.count() * pairs], terms });
-        Plan { ranks: ranks.collect(), fits: vec![None; pairs], error: 0.0, width }
+impl Plan {
+    /// Fits each pair of an output ring and the input ring that it reaches.
+    fn new(terms: Vec<Terms>, width: f64, pairs: &[Option<Reached>], tolerance: f64) -> Plan {
+        let of_rank = |terms: Terms| Rank { factors: vec![0.0; 2 * terms.count() * pairs.len()], terms };
+        let mut ranks: Vec<Rank> = terms.into_iter().map(of_rank).collect();
+        let mut worst: f64 = 0.0;
+        let mut fit = |(i, reached): (usize, &Option<Reached>)| {
+            let transport = &reached.as_ref()?.transport;
+            let error = ranks.iter_mut().map(|rank| rank.fit(i, transport)).fold(0.0, f64::max);
+            let met = error <= tolerance;
+            if met {
+                worst = worst.max(error);
+            }
+            Some(met)
+        };
+        let fits = pairs.iter().enumerate().map(&mut fit).collect();
+        Plan { fits, error: worst, ranks, width }
     }
 
     /// How the block's windows are summed.
@@ -177,31 +193,41 @@ impl Plan {
         let n = block.output.len();
         &self.fits[(ring - block.rings.start) * n..][..n]
     }
+
+    /// The output rings that reach an input ring and whose fits meet the tolerance, each with its place.
+    fn met<'a>(&self, block: &'a Block<'_>, ring: usize) -> impl Iterator<Item = (usize, &'a OutputRing, &'a Reached)> {
+        let fits = self.fits_of(block, ring);
+        block.reaching(ring).filter(|(i, ..)| fits[*i] == Some(true))
+    }
 }
 
-/// Some pixels of each output ring, and what is needed to sum their windows.
-#[derive(Default)]
+/// Input rings that are added at a time: the windows' sums are then read and written but once for all of them.
+const TOGETHER: usize = 4;
+
+/// Some pixels of each output ring, and what is needed to sum their windows. Numbers come in sets, for each term of a
+/// rank a real part, then for each an imaginary part.
 struct Tile {
     /// The pixels of each ring's quadrant.
     parts: Vec<Range<usize>>,
-    /// For each plain row the prefix sums along an input ring, and for each output ring the windows' sums.
-    plain: Vec<(Vec<f64>, Vec<Vec<f64>>)>,
-    /// The pixels of that ring within each window, counted from the first prefix sum.
-    spans: Spans,
-    ranks: Vec<TileRank>,
+    /// Sums of the plain rows: for each row, for each output ring, for each pixel.
+    plain: Vec<Vec<Vec<f64>>>,
+    /// Σ c_k (differences of prefix sums): for each rank, for each output ring, a set for each pixel.
+    totals: Vec<Vec<Vec<f64>>>,
+    /// For each rank e^{i m_k φ} at pixels of the input rings, and, conjugated, of the output rings.
+    phases: Vec<(Phases, Phases)>,
+    inputs: [Input; TOGETHER],
 }
 
-/// The same for one rank. Numbers come in sets, for each term a real part, then for each an imaginary part.
-#[derive(Default)]
-struct TileRank {
-    /// Prefix sums along an input ring of P e^{i m_k φ}.
-    prefix: Vec<f64>,
-    /// For each output ring Σ c_k (differences of prefix sums), a set for each pixel.
-    totals: Vec<Vec<f64>>,
-    /// e^{i m_k φ} at pixels of the input rings.
-    phases: Phases,
-    /// The same, conjugated, of the output rings.
-    back: Phases,
+/// Prefix sums along an input ring.
+struct Input {
+    /// Of each plain row.
+    plain: Vec<Vec<f64>>,
+    /// Of P e^{i m_k φ}, for each rank.
+    ranks: Vec<Vec<f64>>,
+    /// The ring's pixel at which they begin, counted in the first quadrant.
+    first: isize,
+    /// The pixels of the ring within each window of the present output ring, counted from there.
+    spans: Spans,
 }
 
 /// e^{i m_k (φ − middle)} at consecutive pixels of the last two kinds of rings asked for, of which the belt has no more.
@@ -239,11 +265,22 @@ struct Spans {
 
 impl Tile {
     fn new(layout: &Layout, plan: &Plan) -> Self {
-        let ranks = plan.ranks.iter().map(|_| TileRank::default());
-        Tile { plain: vec![Default::default(); layout.first_rank], ranks: ranks.collect(), ..Tile::default() }
+        let input = || Input {
+            plain: vec![vec![0.0]; layout.first_rank],
+            ranks: plan.ranks.iter().map(|rank| vec![0.0; 2 * rank.terms.count()]).collect(),
+            first: 0,
+            spans: Spans::default(),
+        };
+        Tile {
+            parts: Vec::new(),
+            plain: vec![Vec::new(); layout.first_rank],
+            totals: vec![Vec::new(); plan.ranks.len()],
+            phases: plan.ranks.iter().map(|_| Default::default()).collect(),
+            inputs: std::array::from_fn(|_| input()),
+        }
     }
 
-    /// Adds the block to the windows about the tile's pixels, input ring by input ring.
+    /// Adds the block to the windows about the tile's pixels.
     fn add(&mut self, block: &Block<'_>, quadrant: usize, layout: &Layout, plan: &Plan, sums: &mut [Sums]) {
         let occupied = || block.output.iter().zip(&self.parts).filter(|(_, part)| !part.is_empty());
         let west = occupied().map(|(ring, part)| ring.phi_of(part.start)).fold(f64::INFINITY, f64::min);
@@ -252,65 +289,110 @@ impl Tile {
             return;
         }
         let middle = (west + east) / 2.0;
-        let empty = |totals: &mut Vec<Vec<f64>>, set: usize| {
-            totals.resize(self.parts.len(), Vec::new());
-            for (totals, part) in totals.iter_mut().zip(&self.parts) {
-                totals.clear();
-                totals.resize(part.len() * set, 0.0);
-            }
-        };
-        self.plain.iter_mut().for_each(|(_, totals)| empty(totals, 1));
-        for (of, rank) in self.ranks.iter_mut().zip(&plan.ranks) {
-            empty(&mut of.totals, 2 * rank.terms.count());
-            (of.phases, of.back) = Default::default();
+        let parts = &self.parts;
+        let zeros = |set: usize| parts.iter().map(|part| vec![0.0; part.len() * set]).collect::<Vec<_>>();
+        self.plain.iter_mut().for_each(|totals| *totals = zeros(1));
+        for (rank, plan) in plan.ranks.iter().enumerate() {
+            self.totals[rank] = zeros(2 * plan.terms.count());
+            self.phases[rank] = Default::default();
         }
-        for number in block.rings.clone() {
-            let fits = plan.fits_of(block, number);
-            let met = || block.reaching(number).filter(|(i, ..)| fits[*i] == Some(true));
-            let Some((_, _, widest)) = met().max_by(|a, b| a.2.half_width.total_cmp(&b.2.half_width)) else { continue };
-            // Prefix sums from one pixel west of all windows to one east.
-            let (from, to) = (widest.span(west).0 - 1, widest.span(east).1 + 1);
-            // The same for all rings of this kind in the block.
-            let all = Reached { half_width: plan.width, ..*widest };
-            let all = all.span(west).0.min(from) - 1..all.span(east).1.max(to) + 1;
-            let moments = block.band.moments(number);
-            let columns =
-                Columns { first: widest.column(from, quadrant), pixels: (to - from) as usize, len: widest.len };
-            for (row, (prefix, _)) in self.plain.iter_mut().enumerate() {
-                fill_plain(prefix, moments.row(row), columns);
+        for first in block.rings.clone().step_by(TOGETHER) {
+            let together = first..(first + TOGETHER).min(block.rings.end);
+            for number in together.clone() {
+                self.fill(number - first, block, number, quadrant, layout, plan, (west, middle, east));
             }
-            for (rank, (of, plan)) in self.ranks.iter_mut().zip(&plan.ranks).enumerate() {
-                of.fill(moments, layout.first_rank + 2 * rank, columns, widest, from, &all, middle, &plan.terms);
-            }
-            for (i, ring, reached) in met() {
-                let part = self.parts[i].clone();
-                self.spans.find(ring, reached, part.clone(), from, &mut sums[i].pixels[part.clone()]);
-                for (prefix, totals) in &mut self.plain {
-                    add_plain(&self.spans, prefix, &mut totals[i]);
-                }
-                let pair = (number - block.rings.start) * block.output.len() + i;
-                for (of, plan) in self.ranks.iter_mut().zip(&plan.ranks) {
-                    let set = 2 * plan.terms.count();
-                    add_spans(set, &self.spans, &of.prefix, &plan.factors[set * pair..][..set], &mut of.totals[i]);
-                }
-            }
+            self.add_inputs(block, together, plan, sums);
         }
-        for (row, (_, totals)) in self.plain.iter().enumerate() {
-            for ((sums, totals), part) in sums.iter_mut().zip(totals).zip(&self.parts) {
-                let windows = sums.data.chunks_exact_mut(sums.rows).skip(part.start);
-                windows.zip(totals).for_each(|(window, total)| window[row] += total);
-            }
+        self.turn_back(block, layout, plan, middle, sums);
+    }
+
+    /// Makes the prefix sums along an input ring, from one pixel west of all windows to one east.
+    #[allow(clippy::too_many_arguments)]
+    fn fill(
+        &mut self,
+        place: usize,
+        block: &Block<'_>,
+        number: usize,
+        quadrant: usize,
+        layout: &Layout,
+        plan: &Plan,
+        (west, middle, east): (f64, f64, f64),
+    ) {
+        let met = plan.met(block, number);
+        let Some((_, _, ring)) = met.max_by(|a, b| a.2.half_width.total_cmp(&b.2.half_width)) else { return };
+        let (from, to) = (ring.span(west).0 - 1, ring.span(east).1 + 1);
+        let columns = Columns { first: ring.column(from, quadrant), pixels: (to - from) as usize, len: ring.len };
+        // The same phases for all rings of this kind in the block.
+        let widest = Reached { half_width: plan.width, ..*ring };
+        let all = widest.span(west).0.min(from) - 1..widest.span(east).1.max(to) + 1;
+        let moments = block.band.moments(number);
+        let input = &mut self.inputs[place];
+        input.first = from;
+        for (row, prefix) in input.plain.iter_mut().enumerate() {
+            fill_plain(prefix, moments.row(row), columns);
         }
-        // Back to each window's own longitude.
-        for (rank, (of, plan)) in self.ranks.iter_mut().zip(&plan.ranks).enumerate() {
+        for (rank, (prefix, plan)) in input.ranks.iter_mut().zip(&plan.ranks).enumerate() {
+            let set = 2 * plan.terms.count();
+            let pixels = (ring.phi_of(all.start) - middle, ring.phi.1, all.len());
+            let sets = self.phases[rank].0.at(pixels, &plan.terms.frequencies);
+            let sets = &sets[(from - all.start) as usize * set..][..columns.pixels * set];
+            prefix.resize((columns.pixels + 1) * set, 0.0);
             let row = layout.first_rank + 2 * rank;
-            for (i, ring) in block.output.iter().enumerate() {
-                let part = &self.parts[i];
-                let Some(west) = part.clone().next().map(|k| ring.phi_of(k)) else { continue };
-                let sets = of.back.at((middle - west, -ring.phi.1, part.len()), &plan.terms.frequencies);
-                let rows = sums[i].rows;
-                let windows = sums[i].data[part.start * rows + row..].chunks_mut(rows);
-                turn_back(2 * plan.terms.count(), &of.totals[i], sets, windows);
+            fill(set, prefix, moments.row(row), moments.row(row + 1), columns, sets);
+        }
+    }
+
+    /// Adds these input rings to the windows.
+    fn add_inputs(&mut self, block: &Block<'_>, rings: Range<usize>, plan: &Plan, sums: &mut [Sums]) {
+        let nothing = vec![0.0; plan.ranks.iter().map(|rank| 2 * rank.terms.count()).max().unwrap_or(0)];
+        for (i, ring) in block.output.iter().enumerate() {
+            let part = self.parts[i].clone();
+            let mut pairs = [None; TOGETHER];
+            for (place, input) in self.inputs.iter_mut().enumerate() {
+                let pair = (rings.start + place - block.rings.start) * block.output.len() + i;
+                let met = place < rings.len() && plan.fits[pair] == Some(true);
+                match block.reached.get(pair) {
+                    Some(Some(reached)) if met => {
+                        pairs[place] = Some(pair);
+                        let pixels = &mut sums[i].pixels[part.clone()];
+                        input.spans.find(ring, reached, part.clone(), input.first, pixels);
+                    }
+                    _ => input.spans.empty(part.len()),
+                }
+            }
+            if pairs == [None; TOGETHER] {
+                continue;
+            }
+            let spans = self.inputs.each_ref().map(|input| &input.spans);
+            for (row, totals) in self.plain.iter_mut().enumerate() {
+                add_plain(spans, self.inputs.each_ref().map(|input| &*input.plain[row]), &mut totals[i]);
+            }
+            for (rank, plan) in plan.ranks.iter().enumerate() {
+                let set = 2 * plan.terms.count();
+                let factors = pairs.map(|pair| match pair {
+                    Some(pair) => &plan.factors[set * pair..][..set],
+                    None => &nothing[..set],
+                });
+                let prefix = self.inputs.each_ref().map(|input| &*input.ranks[rank]);
+                Arch::new().dispatch(AddSpans { set, spans, prefix, factors, totals: &mut self.totals[rank][i] });
+            }
+        }
+    }
+
+    /// Adds the totals to the windows, turned back to each window's own longitude.
+    fn turn_back(&mut self, block: &Block<'_>, layout: &Layout, plan: &Plan, middle: f64, sums: &mut [Sums]) {
+        for (i, ring) in block.output.iter().enumerate() {
+            let part = &self.parts[i];
+            let rows = sums[i].rows;
+            let windows = &mut sums[i].data[part.start * rows..part.end * rows];
+            for (row, totals) in self.plain.iter().enumerate() {
+                windows.chunks_exact_mut(rows).zip(&totals[i]).for_each(|(window, total)| window[row] += total);
+            }
+            for (rank, plan) in plan.ranks.iter().enumerate().filter(|_| !part.is_empty()) {
+                let pixels = (middle - ring.phi_of(part.start), -ring.phi.1, part.len());
+                let sets = self.phases[rank].1.at(pixels, &plan.terms.frequencies);
+                let windows = windows[layout.first_rank + 2 * rank..].chunks_mut(rows);
+                turn_back(2 * plan.terms.count(), &self.totals[rank][i], sets, windows);
             }
         }
     }
@@ -350,29 +432,12 @@ fn fill_plain(prefix: &mut Vec<f64>, row: &[f64], columns: Columns) {
     }
 }
 
-impl TileRank {
-    #[allow(clippy::too_many_arguments)]
-    fn fill(
-        &mut self,
-        moments: &RingMoments,
-        row: usize,
-        columns: Columns,
-        ring: &Reached,
-        from: isize,
-        all: &Range<isize>,
-        middle: f64,
-        terms: &Terms,
-    ) {
-        let set = 2 * terms.count();
-        let pixels = (ring.phi_of(all.start) - middle, ring.phi.1, all.len());
-        let sets = self.phases.at(pixels, &terms.frequencies);
-        let sets = &sets[(from - all.start) as usize * set..][..columns.pixels * set];
-        self.prefix.resize((columns.pixels + 1) * set, 0.0);
-        fill(set, &mut self.prefix, moments.row(row), moments.row(row + 1), columns, sets);
-    }
-}
-
 impl Spans {
+    /// Nothing, for so many windows.
+    fn empty(&mut self, windows: usize) {
+        (self.from, self.to) = (vec![0; windows], vec![0; windows]);
+    }
+
     /// Finds the pixels, counted from `first`, of an input ring in the windows about these pixels of an output ring, and
     /// adds their numbers to `pixels`.
     fn find(&mut self, ring: &OutputRing, reached: &Reached, part: Range<usize>, first: isize, pixels: &mut [u64]) {
@@ -470,23 +535,21 @@ fn fill_sets<const K: usize, const SET: usize>(
 
 /// Adds the differences of prefix sums over each span.
 #[multiversion::multiversion(targets = "simd")]
-fn add_plain(spans: &Spans, prefix: &[f64], totals: &mut [f64]) {
-    for ((&from, &to), total) in spans.from.iter().zip(&spans.to).zip(totals) {
-        *total += prefix[to as usize] - prefix[from as usize];
+fn add_plain(spans: [&Spans; TOGETHER], prefix: [&[f64]; TOGETHER], totals: &mut [f64]) {
+    for (spans, prefix) in spans.into_iter().zip(prefix) {
+        for ((&from, &to), total) in spans.from.iter().zip(&spans.to).zip(&mut *totals) {
+            *total += prefix[to as usize] - prefix[from as usize];
+        }
     }
-}
-
-fn add_spans(set: usize, spans: &Spans, prefix: &[f64], factors: &[f64], totals: &mut [f64]) {
-    Arch::new().dispatch(AddSpans { set, spans, prefix, factors, totals });
 }
 
 /// Adds factors times the differences of prefix sums over each span. Written with explicit vectors: left to itself, the
 /// compiler reads several sets at a time, number by number.
 struct AddSpans<'a> {
     set: usize,
-    spans: &'a Spans,
-    prefix: &'a [f64],
-    factors: &'a [f64],
+    spans: [&'a Spans; TOGETHER],
+    prefix: [&'a [f64]; TOGETHER],
+    factors: [&'a [f64]; TOGETHER],
     totals: &'a mut [f64],
 }
 
@@ -514,14 +577,21 @@ impl WithSimd for AddSpans<'_> {
 impl AddSpans<'_> {
     #[inline(always)]
     fn add<S: Simd, const N: usize>(self, simd: S) {
-        let sets = |values| S::as_simd_f64s(values).0.as_chunks::<N>().0;
-        let (factors, prefix) = (&sets(self.factors)[0], sets(self.prefix));
+        let AddSpans { spans, .. } = self;
+        let factors = self.factors.map(|factors| S::as_simd_f64s(factors).0.as_chunks::<N>().0[0]);
+        let prefix = self.prefix.map(|prefix| S::as_simd_f64s(prefix).0.as_chunks::<N>().0);
         let totals = S::as_mut_simd_f64s(self.totals).0.as_chunks_mut::<N>().0;
-        for ((&from, &to), total) in self.spans.from.iter().zip(&self.spans.to).zip(totals) {
-            let (from, to) = (&prefix[from as usize], &prefix[to as usize]);
-            for k in 0..N {
-                total[k] = simd.mul_add_f64s(factors[k], simd.sub_f64s(to[k], from[k]), total[k]);
+        let windows = totals.len();
+        let spans = spans.map(|spans| (&spans.from[..windows], &spans.to[..windows]));
+        for (w, total) in totals.iter_mut().enumerate() {
+            let mut sum = *total;
+            for r in 0..TOGETHER {
+                let (from, to) = (&prefix[r][spans[r].0[w] as usize], &prefix[r][spans[r].1[w] as usize]);
+                for k in 0..N {
+                    sum[k] = simd.mul_add_f64s(factors[r][k], simd.sub_f64s(to[k], from[k]), sum[k]);
+                }
             }
+            *total = sum;
         }
     }
 }
@@ -594,5 +664,36 @@ fn turn_sets_back<const K: usize, const SET: usize>(
         }
         window[0] += re;
         window[1] += im;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use longan_formats::Healpix;
+
+    /// Fits are judged by what they give, whatever they were meant to fit.
+    #[test]
+    fn bad_fits_are_seen() {
+        let (grid, radius) = (Healpix::new(64).unwrap(), 0.1);
+        let output: Vec<OutputRing> = (40..48).map(|i| OutputRing::new(grid, grid, i, radius)).collect();
+        let input = (38..46).map(|i| (i, grid.ring(i)));
+        let pairs: Vec<Option<Reached>> = input
+            .flat_map(|(i, ring)| output.iter().map(move |from| from.reached(i, &ring, ring.theta(), radius)))
+            .collect();
+        let width = pairs.iter().flatten().map(|r| r.half_width).fold(0.0, f64::max);
+        let sample: Vec<RingTransport> = pairs.iter().flatten().map(|r| r.transport).collect();
+        let good = || Terms::new(2, width, &sample, 1e-7).unwrap();
+        let all = |terms: Terms, met: bool| {
+            let plan = Plan::new(vec![terms], width, &pairs, 1e-7);
+            pairs.iter().zip(&plan.fits).all(|(pair, fit)| *fit == pair.map(|_| met)) && (met == (plan.error > 0.0))
+        };
+        assert!(all(good(), true));
+        // The phases of another hemisphere, and of wider windows.
+        let mirrored: Vec<RingTransport> = (200..208)
+            .map(|i| RingTransport::new(grid.ring(i).theta().sin_cos(), grid.ring(i).theta().sin_cos()))
+            .collect();
+        assert!(all(Terms::new(40, width, &mirrored, 1e-7).unwrap().of_rank(2), false));
+        assert!(all(Terms::new(2, 30.0 * width, &sample, 0.1).unwrap(), false));
     }
 }

@@ -68,6 +68,33 @@ fn formulas_work_in_runs_of_all_sorts() {
 }
 
 #[test]
+fn a_formula_in_several_windows_is_that_of_each_alone() {
+    let folder = Folder::with_sky();
+    let formula = "beta = (w1 - psi2)/(w1 + psi2)";
+    let map = |output: &str, window: &str| format!("map sky.fits -o {output} --measure '{formula}' --window {window}");
+    folder.done(&map("both.fits", "4,6"));
+    folder.done(&map("both.nc", "4,6"));
+    let headers = folder.headers("both.fits");
+    assert_eq!(headers.len(), 2);
+    let cube = netcdf::open(folder.path("both.nc")).unwrap();
+    let text = |value: netcdf::AttributeValue| String::try_from(value).unwrap();
+    assert_eq!(text(cube.attribute("formula1").unwrap().value().unwrap()), formula);
+    for (hdu, window) in [(1, "4"), (2, "6")] {
+        let header = &headers[hdu - 1];
+        assert_eq!([&*header["EXTNAME"], &*header["FORMULA1"]], [&*format!("WINDOW {window}"), formula]);
+        folder.done(&map(&format!("alone{window}.fits"), window));
+        let alone = folder.read(format!("alone{window}.fits"), "BETA");
+        assert!(alone.values().iter().any(|v| !v.is_nan()));
+        assert_same(&folder.read_hdu("both.fits", "BETA", Some(hdu)), &alone);
+        let variable = format!("BETA_WINDOW_{window}");
+        assert_same(&folder.read("both.nc", &variable), &alone);
+        let long_name = cube.variable(&variable).unwrap().attribute_value("long_name").unwrap().unwrap();
+        assert_eq!(text(long_name), formula);
+    }
+    folder.refused(&map("none.fits", "4,4"), &["sky.fits: the window of 4 degrees is asked for twice"]);
+}
+
+#[test]
 fn wrong_formulas_are_marked_at_their_place() {
     let folder = Folder::with_sky();
     for (formula, parts) in [

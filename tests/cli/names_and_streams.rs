@@ -130,6 +130,47 @@ fn progress_is_shown_at_a_terminal_only() {
     assert_eq!(at_a_terminal(&folder, &format!("{words} --quiet")).as_deref(), Some(""));
 }
 
+/// A surface.
+const TETRAHEDRON: &str = "ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+property float signal
+element face 4
+property list uchar int vertex_indices
+end_header
+1 1 1 0
+1 -1 -1 1
+-1 1 -1 2
+-1 -1 1 3
+3 0 1 2
+3 0 3 1
+3 0 2 3
+3 1 3 2
+";
+
+/// A file like ERA5's, with times and levels.
+fn netcdf_with_levels(path: &Path) {
+    let mut file = netcdf::create(path).unwrap();
+    for (name, units, values) in [
+        ("time", "days since 1997-12-01", &[0.0, 31.0][..]),
+        ("level", "hPa", &[500.0, 850.0]),
+        ("lat", "degrees_north", &[60.0, 20.0, -20.0, -60.0]),
+        ("lon", "degrees_east", &[0.0, 60.0, 120.0, 180.0, 240.0, 300.0]),
+    ] {
+        file.add_dimension(name, values.len()).unwrap();
+        let mut coordinate = file.add_variable::<f64>(name, &[name]).unwrap();
+        coordinate.put_attribute("units", units).unwrap();
+        coordinate.put_values(values, ..).unwrap();
+    }
+    let values: Vec<f64> = (0..96).map(|n| f64::from(n * 7 % 13)).collect();
+    file.add_variable::<f64>("z", &["time", "level", "lat", "lon"]).unwrap().put_values(&values, ..).unwrap();
+    file.close().unwrap();
+    unlock(path);
+}
+
 #[test]
 fn help_fits_a_terminal_and_its_examples_run() {
     let folder = Folder::new();
@@ -139,10 +180,11 @@ fn help_fits_a_terminal_and_its_examples_run() {
         "map --help",
         "map -h",
         "totals --help",
+        "regrid --help",
         "info --help",
         "measures --help",
-        "demo --help",
         "plugin new --help",
+        "demo --help",
     ] {
         let help = folder.done(words);
         assert!(help.contains("Usage: longan") && help.lines().all(|l| l.chars().count() <= 100), "{help}");
@@ -156,8 +198,13 @@ fn help_fits_a_terminal_and_its_examples_run() {
     folder.write("mask.fits", &map_file(&[1.0; 3072], &[]));
     std::fs::create_dir(folder.path("sims")).unwrap();
     std::fs::copy(folder.path("sky.fits"), folder.path("sims/one.fits")).unwrap();
+    netcdf_with_levels(&folder.path("era5.nc"));
+    let row = |i: usize| format!("{},{},{}\n", i * 7 % 360, i as f64 / 4.0 - 80.0, i % 11);
+    let stations: String = (0..640).map(row).collect();
+    folder.write("stations.csv", ("lon,lat,rain\n".to_owned() + &stations).as_bytes());
+    folder.write("cell.ply", TETRAHEDRON.as_bytes());
     let mut run = 0;
-    for words in ["--help", "map --help", "totals --help", "simulate --help"] {
+    for words in ["--help", "map --help", "totals --help", "regrid --help", "simulate --help"] {
         let help = folder.done(words);
         let examples = help.lines().filter(|l| l.starts_with("  longan "));
         for example in examples {

@@ -3,6 +3,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
+use super::steps::steps;
 use super::*;
 use crate::skipped;
 
@@ -203,6 +204,57 @@ fn plugins_that_panic_or_fail_leave_no_output() {
         &format!("map sky.fits -o out.fits --plugin {}", quoted(&unready)),
         &["unready", "cannot start: it panicked at ", "the table of constants is missing"],
     );
+}
+
+#[test]
+fn plugins_measure_each_step() {
+    let folder = Folder::new();
+    // Only the last step has the south too.
+    Layout { steps: 3, ..Layout::of(7.5) }.write(&folder.path("series.nc"), |step, latitude, longitude| {
+        let (lat, lon) = (latitude.to_radians(), longitude.to_radians() + step as f64);
+        if step < 2 && lat < 0.0 {
+            f64::NAN
+        } else {
+            lat.cos() * lon.sin() + 0.6 * (2.0 * lat).sin() * (3.0 * lon).cos()
+        }
+    });
+    let [rust, misbehaving, _] = in_rust();
+    let options =
+        format!("--plugin {} --measure 'evq,quotient,Twice = 2*evq' --window 25 --nside-out 4", quoted(&rust));
+    for output in ["cube.nc", "tables.fits"] {
+        let printed = folder.done(&format!("map series.nc -o {output} {options}"));
+        assert!(printed.starts_with(&format!("{output}: 3 steps of EVQ of Nside 4 from ")), "{printed}");
+    }
+    let headers = folder.headers("tables.fits");
+    let [evq, quotient, twice] = ["EVQ", "QUOTIENT", "TWICE"].map(|variable| steps(&folder, "cube.nc", variable));
+    assert_eq!([headers.len(), evq.len(), quotient.len()], [3, 3, 3]);
+    for step in 0..3 {
+        assert!(evq[step].values().iter().any(|v| !v.is_nan()));
+        assert_same(&evq[step], &quotient[step]);
+        let doubled: Vec<f64> = evq[step].values().iter().map(|v| 2.0 * v).collect();
+        assert_eq!(difference(twice[step].values(), &doubled), 0.0);
+        assert_same(&folder.read_hdu("tables.fits", "QUOTIENT", Some(step + 1)), &quotient[step]);
+        folder.done(&format!("map series.nc -o alone.fits --overwrite --select time=#{step} {options}"));
+        assert_same(&folder.read("alone.fits", "QUOTIENT"), &quotient[step]);
+        assert!(headers[step]["PLUGIN1"].starts_with("example ") && headers[step]["FORMULA1"] == "Twice = 2*evq");
+    }
+    let cube = netcdf::open(folder.path("cube.nc")).unwrap();
+    let attribute = |name: &str| String::try_from(cube.attribute(name).unwrap().value().unwrap()).unwrap();
+    assert_eq!(
+        [attribute("plugin1"), attribute("formula1")],
+        ["PLUGIN1", "FORMULA1"].map(|key| headers[0][key].clone())
+    );
+    assert!(cube.attribute("plugin2").is_none() && cube.attribute("formula2").is_none());
+
+    // A failure in a later step leaves nothing of the earlier ones.
+    let map = format!("map series.nc --plugin {} --measure evq,later --window 5 --nside-out 4", quoted(&misbehaving));
+    for output in ["out.nc", "out.fits"] {
+        folder.refused(
+            &format!("{map} -o {output}"),
+            &["series.nc: at 1997-12-03: the measure 'later' failed: it panicked at ", "only the north is known"],
+        );
+        folder.done(&format!("{map} -o early_{output} --select time=#1"));
+    }
 }
 
 #[test]

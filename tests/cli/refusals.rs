@@ -18,10 +18,10 @@ fn files_that_are_no_maps() {
     let files: [(&str, Vec<u8>, &[&str]); 27] = [
         ("empty.fits", vec![], &["an empty file"]),
         ("text.fits", b"longitude latitude value\n".to_vec(), &["a text file", "convert it first"]),
-        ("table.fits", b"longitude,latitude,value\n".to_vec(), &["a text file (perhaps CSV)"]),
+        ("table.fits", b"longitude,latitude,value\n".to_vec(), &["column", "--variable"]),
         ("png.fits", b"\x89PNG\r\n\x1a\n\0\0".to_vec(), &["a PNG picture"]),
-        ("hdf5.fits", b"\x89HDF\r\n\x1a\n\0\0".to_vec(), &["HDF5 or NetCDF-4"]),
-        ("netcdf.fits", b"CDF\x01\0\0\0".to_vec(), &["a NetCDF file"]),
+        ("hdf5.fits", b"\x89HDF\r\n\x1a\n\0\0".to_vec(), &["the NetCDF library says"]),
+        ("netcdf.fits", b"CDF\x01\0\0\0".to_vec(), &["the NetCDF header is damaged"]),
         ("zip.fits", b"PK\x03\x04aaaa".to_vec(), &["a ZIP archive"]),
         ("bits.fits", vec![0, 1, 2, 254], &["unknown kind"]),
         ("picture.fits", picture(20, 10), &["a picture of 20 × 10 pixels", "choose a file"]),

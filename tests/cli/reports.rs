@@ -117,6 +117,60 @@ fn info_says_what_it_sees() {
     assert!(folder.done("info fine.fits --nside 8").contains("1.000000"));
 }
 
+/// A field on a grid of 3 latitudes and 4 longitudes at 2 times, and one that also has levels.
+fn netcdf_file(path: &std::path::Path) {
+    let mut file = netcdf::create(path).unwrap();
+    for (name, len, units, values) in [
+        ("time", 2, "days since 1997-12-01", &[0.0, 31.0][..]),
+        ("level", 2, "hPa", &[500.0, 850.0]),
+        ("lat", 3, "degrees_north", &[60.0, 0.0, -60.0]),
+        ("lon", 4, "degrees_east", &[0.0, 90.0, 180.0, 270.0]),
+    ] {
+        file.add_dimension(name, len).unwrap();
+        let mut coordinate = file.add_variable::<f64>(name, &[name]).unwrap();
+        coordinate.put_attribute("units", units).unwrap();
+        coordinate.put_values(values, ..).unwrap();
+    }
+    let values: Vec<f64> = (0..24).map(|n| if n < 3 { f64::NAN } else { f64::from(n) }).collect();
+    let mut field = file.add_variable::<f64>("t", &["time", "lat", "lon"]).unwrap();
+    field.put_attribute("units", "K").unwrap();
+    field.put_attribute("long_name", "Temperature").unwrap();
+    field.put_values(&values, ..).unwrap();
+    file.add_variable::<f32>("u", &["level", "lat", "lon"]).unwrap();
+    file.close().unwrap();
+    unlock(path);
+}
+
+#[test]
+fn info_describes_grids_of_latitude_and_longitude() {
+    let folder = Folder::new();
+    netcdf_file(&folder.path("field.nc"));
+    let text = folder.done("info field.nc");
+    assert!(text.starts_with("field.nc: NetCDF\n\nVariable 't'\n"), "{text}");
+    for line in [
+        "grid         3 latitudes x 4 longitudes, global",
+        "latitudes    60 to -60 deg, one every 60.0000 deg",
+        "longitudes   0 to 270 deg, one every 90.0000 deg",
+        "time         2 steps: 1997-12-01, 1998-01-01",
+        "level        2 values: 500, 850 (hPa)",
+        "long name    Temperature",
+    ] {
+        assert!(text.lines().any(|l| l.trim() == line), "no '{line}' in {text}");
+    }
+    let words: Vec<_> = text.lines().map(|l| l.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
+    // Of the first time, from 3 to 11, of which three values are missing.
+    assert!(words.iter().any(|l| l == "0 t K 3.000000 11.000000 7.000000 2.581989 25.000% (at 1997-12-01)"), "{text}");
+    assert!(words.iter().any(|l| l == "1 u - needs --select level=VALUE"), "{text}");
+
+    let report = json(&folder.done("info field.nc --format json"));
+    let [t, u] = [0, 1].map(|i| &report["tables"][i]);
+    assert_eq!((&t["variable"], &t["latitudes"]["count"], &t["global"]), (&"t".into(), &3.into(), &true.into()));
+    assert_eq!((&t["fields"][0]["time"], &t["fields"][0]["max"]), (&"1997-12-01".into(), &11.0.into()));
+    assert_eq!(t["dimensions"][0]["values"], "1997-12-01, 1998-01-01");
+    assert_eq!(u["fields"][0]["select"], serde_json::json!(["level"]));
+    assert!(u["fields"][0]["max"].is_null() && t["fields"][0].get("select").is_none());
+}
+
 #[test]
 fn every_measure_is_listed() {
     let folder = Folder::new();

@@ -137,3 +137,35 @@ fn a_killed_run_leaves_the_old_output() {
     let left = entries.iter().filter(|e| hidden(e)).count();
     assert!(left > 0 && entries.len() == 2 + left, "{entries:?}");
 }
+
+/// Ctrl-C, while the output is being written too, leaves nothing behind.
+#[test]
+#[cfg(unix)]
+fn an_interrupted_run_leaves_nothing() {
+    let folder = Folder::new();
+    folder.done("simulate waves -o sky.fits --nside 32 --correlation 10");
+    // Most of the time goes into writing.
+    let words = "map sky.fits -o out.fits.gz --window 0 --sequence --measure w0,w1,psi2,psi3";
+    let start = Instant::now();
+    folder.done(words);
+    let whole = start.elapsed();
+    std::fs::remove_file(folder.path("out.fits.gz")).unwrap();
+    let (rounds, mut seen) = (16, 0);
+    for round in 0..rounds {
+        let mut child = folder.command(words).stdout(Stdio::null()).spawn().unwrap();
+        // At first until the program can be interrupted at all.
+        std::thread::sleep(Duration::from_millis(20) + whole * round / rounds);
+        seen += std::fs::read_dir(folder.path("")).unwrap().filter(|e| hidden(e.as_ref().unwrap())).count();
+        let killed = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let ended = child.wait().unwrap();
+        let _ = std::fs::remove_file(folder.path("out.fits.gz"));
+        let entries: Vec<_> = std::fs::read_dir(folder.path("")).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(entries, ["sky.fits"], "round {round}: {killed} {ended}");
+        if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&ended) {
+            assert_eq!(signal, 2);
+        } else {
+            assert!(ended.success(), "round {round}: {ended}");
+        }
+    }
+    assert!(seen > 0, "no unfinished file was ever seen");
+}

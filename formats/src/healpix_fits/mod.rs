@@ -1,6 +1,6 @@
 //! HEALPix maps in FITS files.
 //!
-//! [`table`] understands headers, [`read`] fetches values, [`multi_order`] brings cells of several sizes to one grid,
+//! [`table`] understands headers, [`read`] fetches values, [`multi_order`] those of cells of several sizes,
 //! [`mod@write`] makes files. The bytes themselves are left to [`crate::cfitsio`].
 
 mod multi_order;
@@ -18,9 +18,9 @@ use tempfile::NamedTempFile;
 
 use crate::adapter::{gunzipped_head, is_gzip};
 use crate::cfitsio::FitsReader;
-use crate::{Adapter, Description, Error, Map, Selection};
+use crate::{Adapter, Description, Error, Map, Maps, Selection, Time};
 
-pub use write::{Card, CardValue, Column, Extension, HealpixFile, write_healpix};
+pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 
 /// FITS files consist of blocks of this many bytes.
 const BLOCK: u64 = 2880;
@@ -47,11 +47,28 @@ impl Adapter for HealpixFits {
         Ok(Description { format: self.name(), tables })
     }
 
-    fn read(&self, path: &Path, selection: &Selection) -> Result<Map, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
         let mut fits = open(path)?;
         let hdu = scan::choose(&mut fits, selection.hdu)?;
         let table = table::Table::parse(&mut fits, hdu)?;
-        read::read(&mut fits, &table, selection)
+        Ok(Box::new(One { fits, table, selection: selection.clone() }))
+    }
+}
+
+/// The one map of a table.
+struct One {
+    fits: FitsReader,
+    table: table::Table,
+    selection: Selection,
+}
+
+impl Maps for One {
+    fn times(&self) -> &[Time] {
+        &[]
+    }
+
+    fn read(&mut self, _: usize) -> Result<Map, Error> {
+        read::read(&mut self.fits, &self.table, &self.selection)
     }
 }
 

@@ -2,15 +2,11 @@
 //!
 //! What the header means is left to [`super::table`], cells of several sizes to [`super::multi_order`].
 
-use rayon::prelude::*;
-
 use super::multi_order;
 use super::table::{self, Column, Kind, Layout, Table};
+use crate::canvas::{CHUNK, Canvas};
 use crate::cfitsio::FitsReader;
-use crate::{Error, Field, Healpix, Map, Ordering, Selection, UNSEEN, is_bad};
-
-/// Values per call to cfitsio: many enough that calls cost nothing, few enough to stay in the cache.
-pub(super) const CHUNK: usize = 1 << 17;
+use crate::{Error, Field, Map, Ordering, Selection, UNSEEN, is_bad};
 
 /// Reads one field of a table.
 pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) -> Result<Map, Error> {
@@ -37,44 +33,6 @@ fn plane(table: &Table, selection: &Selection) -> Option<usize> {
         Some(Field::Number(number)) => number,
         _ => 0,
     })
-}
-
-/// A map under construction: values come in the file's ordering and are put where RING order has them.
-pub(super) struct Canvas {
-    grid: Healpix,
-    ordering: Ordering,
-    values: Vec<f64>,
-}
-
-impl Canvas {
-    /// A map with all pixels masked.
-    pub(super) fn new(grid: Healpix, ordering: Ordering) -> Result<Self, Error> {
-        let mut canvas = Canvas::reserved(grid, ordering)?;
-        canvas.values.resize(grid.pixels(), f64::NAN);
-        Ok(canvas)
-    }
-
-    /// A map without any pixels yet, and the memory for all of them.
-    fn reserved(grid: Healpix, ordering: Ordering) -> Result<Self, Error> {
-        let mut values = Vec::new();
-        values.try_reserve_exact(grid.pixels()).map_err(|_| Error::Memory {
-            nside: grid.nside(),
-            gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
-        })?;
-        Ok(Canvas { grid, ordering, values })
-    }
-
-    /// Sets some pixels, named by `places` in the file's ordering, which this overwrites.
-    pub(super) fn put(&mut self, places: &mut [u64], values: &[f64]) -> Result<(), Error> {
-        if self.ordering == Ordering::Nested {
-            let layer = cdshealpix::nested::get(self.grid.depth()?);
-            places.par_iter_mut().for_each(|p| *p = layer.to_ring(*p));
-        }
-        for (&place, &value) in places.iter().zip(values) {
-            self.values[place as usize] = value;
-        }
-        Ok(())
-    }
 }
 
 fn implicit(

@@ -8,7 +8,10 @@ use std::ops::Range;
 
 use super::multi_order;
 use crate::cfitsio::FitsReader;
-use crate::{CoordinateSystem, Error, Field, FieldDescription, Healpix, Indexing, Ordering, TableDescription};
+use crate::{
+    CoordinateSystem, Error, Field, FieldDescription, GridDescription, Healpix, Indexing, Ordering, TableDescription,
+    TablePlace,
+};
 
 /// A HEALPix table.
 pub(super) struct Table {
@@ -201,20 +204,19 @@ impl Table {
                 (Indexing::MultiOrder, nside, self.rows * index.repeat)
             }
         };
+        let field = |c: &Column| FieldDescription { name: c.name.clone(), unit: c.unit.clone(), long_name: None };
         Ok(TableDescription {
-            hdu: self.hdu,
-            name: self.name.clone(),
-            nside,
-            ordering: self.ordering,
-            ordering_assumed: self.ordering_assumed,
-            coordinates: self.coordinates,
-            indexing,
-            pixels,
-            fields: self
-                .columns
-                .iter()
-                .map(|c| FieldDescription { name: c.name.clone(), unit: c.unit.clone() })
-                .collect(),
+            place: TablePlace::Hdu { hdu: self.hdu, name: self.name.clone() },
+            grid: GridDescription::Healpix {
+                nside,
+                ordering: self.ordering,
+                ordering_assumed: self.ordering_assumed,
+                coordinates: self.coordinates,
+                indexing,
+                pixels,
+            },
+            dimensions: Vec::new(),
+            fields: self.columns.iter().map(field).collect(),
         })
     }
 

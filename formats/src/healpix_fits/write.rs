@@ -1,16 +1,16 @@
-//! HEALPix FITS files of whole maps, one table per extension.
+//! HEALPix FITS files of whole maps, one table per extension, written one after the other.
 //!
 //! The same input always gives the same bytes. What the values and header entries mean is left to the caller.
 
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
-use super::read::CHUNK;
+use crate::canvas::CHUNK;
 use crate::cfitsio::FitsWriter;
 use crate::{CoordinateSystem, Error, Healpix, Ordering, UNSEEN, save};
 
@@ -77,6 +77,29 @@ pub struct HealpixFile {
     pub extensions: Vec<Extension>,
 }
 
+/// What the tables of a file have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct HealpixLayout {
+    /// The grid of all columns.
+    pub grid: Healpix,
+    /// The ordering to write.
+    pub ordering: Ordering,
+    /// The coordinate system, if known.
+    pub coordinates: Option<CoordinateSystem>,
+    /// Whether to write single precision.
+    pub float32: bool,
+}
+
+/// A file to which tables are written one by one, so that no more than one is in memory.
+pub struct HealpixWriter {
+    layout: HealpixLayout,
+    fits: FitsWriter,
+    /// The file to make.
+    path: PathBuf,
+    /// Where it is made before it is compressed, if it is.
+    plain: Option<PathBuf>,
+}
+
 /// Values per row, as other software writes them.
 const ROW: usize = 1024;
 
@@ -86,17 +109,57 @@ const ROW: usize = 1024;
 /// [`Error::File`], which names the file, around the reason: [`Error::ColumnLength`], [`Error::CardKey`],
 /// [`Error::LongName`], [`Error::NotNested`], or those of [`save()`].
 pub fn write_healpix(path: &Path, file: &HealpixFile, overwrite: bool) -> Result<(), Error> {
-    file.check().map_err(|e| e.of(path))?;
-    let compressed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let HealpixFile { grid, ordering, coordinates, float32, ref extensions } = *file;
+    let layout = HealpixLayout { grid, ordering, coordinates, float32 };
+    layout
+        .check()
+        .and_then(|()| extensions.iter().try_for_each(|e| layout.check_extension(e)))
+        .map_err(|e| e.of(path))?;
     save(path, overwrite, |path| {
-        if !compressed {
-            return file.write(path);
-        }
-        let plain = path.with_extension("");
-        file.write(&plain)?;
-        let result = compress(&plain, path);
-        std::fs::remove_file(&plain).and(result).map_err(Error::io("compress it"))
+        let mut writer = HealpixWriter::create(path, layout)?;
+        extensions.iter().try_for_each(|extension| writer.append(extension))?;
+        writer.finish()
     })
+}
+
+impl HealpixWriter {
+    /// Begins a file, which must not exist: inside of [`save()`], the one whose path it gives. It is gzip-compressed
+    /// where the path ends in `.gz`.
+    ///
+    /// # Errors
+    /// [`Error::NotNested`], or [`Error::CfitsioWrite`].
+    pub fn create(path: &Path, layout: HealpixLayout) -> Result<Self, Error> {
+        layout.check()?;
+        let compressed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+        let plain = compressed.then(|| path.with_extension(""));
+        let mut fits = FitsWriter::create(plain.as_deref().unwrap_or(path))?;
+        fits.write_primary()?;
+        Ok(HealpixWriter { layout, fits, path: path.to_owned(), plain })
+    }
+
+    /// Writes the next table.
+    ///
+    /// # Errors
+    /// [`Error::ColumnLength`], [`Error::CardKey`], [`Error::LongName`], or [`Error::CfitsioWrite`].
+    pub fn append(&mut self, extension: &Extension) -> Result<(), Error> {
+        self.layout.check_extension(extension)?;
+        self.layout.write_header(&mut self.fits, extension)?;
+        for (number, column) in (1..).zip(&extension.columns) {
+            self.layout.write_column(&mut self.fits, number, &column.values)?;
+        }
+        Ok(())
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`Error::CfitsioWrite`], or [`Error::Io`] where it cannot be compressed.
+    pub fn finish(self) -> Result<(), Error> {
+        self.fits.close()?;
+        let Some(plain) = self.plain else { return Ok(()) };
+        let result = compress(&plain, &self.path);
+        std::fs::remove_file(&plain).and(result).map_err(Error::io("compress it"))
+    }
 }
 
 /// Compresses a file without noting its name or time.
@@ -106,44 +169,36 @@ fn compress(from: &Path, to: &Path) -> io::Result<()> {
     encoder.finish()?.flush()
 }
 
-impl HealpixFile {
+impl HealpixLayout {
+    /// Whether there is such a file.
     fn check(&self) -> Result<(), Error> {
         if self.ordering == Ordering::Nested {
             self.grid.depth()?;
         }
-        for extension in &self.extensions {
-            name(&extension.name)?;
-            for Card { key, .. } in &extension.cards {
-                let legal = |b: u8| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
-                if key.is_empty() || key.len() > 8 || !key.bytes().all(legal) {
-                    return Err(Error::CardKey { key: key.clone() });
-                }
-            }
-            for column in &extension.columns {
-                name(&column.name).and(name(&column.unit))?;
-                if column.values.len() != self.grid.pixels() {
-                    return Err(Error::ColumnLength {
-                        column: column.name.clone(),
-                        found: column.values.len(),
-                        nside: self.grid.nside(),
-                        expected: self.grid.pixels(),
-                    });
-                }
-            }
-        }
         Ok(())
     }
 
-    fn write(&self, path: &Path) -> Result<(), Error> {
-        let mut fits = FitsWriter::create(path)?;
-        fits.write_primary()?;
-        for extension in &self.extensions {
-            self.write_header(&mut fits, extension)?;
-            for (number, column) in (1..).zip(&extension.columns) {
-                self.write_column(&mut fits, number, &column.values)?;
+    /// Whether this can be a table of it.
+    fn check_extension(&self, extension: &Extension) -> Result<(), Error> {
+        name(&extension.name)?;
+        for Card { key, .. } in &extension.cards {
+            let legal = |b: u8| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
+            if key.is_empty() || key.len() > 8 || !key.bytes().all(legal) {
+                return Err(Error::CardKey { key: key.clone() });
             }
         }
-        fits.close()
+        for column in &extension.columns {
+            name(&column.name).and(name(&column.unit))?;
+            if column.values.len() != self.grid.pixels() {
+                return Err(Error::ColumnLength {
+                    column: column.name.clone(),
+                    found: column.values.len(),
+                    nside: self.grid.nside(),
+                    expected: self.grid.pixels(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Values per row of the table.

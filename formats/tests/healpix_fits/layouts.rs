@@ -1,6 +1,6 @@
 //! Every layout in which a map can be stored gives the same map.
 
-use longan_formats::{Error, Indexing, Ordering, UNSEEN, describe};
+use longan_formats::{CoordinateSystem, Error, GridDescription, Indexing, Ordering, TablePlace, UNSEEN, describe};
 
 use crate::bytes::{Col, col, f32s, f64s, file, gzip, i16s, i32s, i64s, primary, table};
 use crate::*;
@@ -435,7 +435,11 @@ fn the_hdu_to_read() {
     assert!(told.contains("HDU 1 ('CATALOGUE', a table of 1 columns and 12 rows)"), "{told}");
 
     let description = describe(&scratch(&bytes).path).unwrap();
-    assert_eq!(description.tables.iter().map(|t| t.hdu).collect::<Vec<_>>(), [2, 3]);
+    let hdus = description.tables.iter().map(|t| match t.place {
+        TablePlace::Hdu { hdu, .. } => hdu,
+        _ => panic!("{:?}", t.place),
+    });
+    assert_eq!(hdus.collect::<Vec<_>>(), [2, 3]);
 }
 
 #[test]
@@ -452,11 +456,19 @@ fn what_a_file_is_said_to_hold() {
     let description = describe(&path.path).unwrap();
     assert_eq!(description.format, "HEALPix FITS");
     let [whole, part] = &description.tables[..] else { panic!("two tables") };
-    assert_eq!((whole.hdu, whole.nside, whole.ordering, whole.ordering_assumed), (1, 2, Ordering::Ring, true));
-    assert_eq!((whole.indexing, whole.pixels, whole.coordinates, &whole.name), (Indexing::Implicit, 48, None, &None));
-    assert_eq!((part.hdu, part.nside, part.ordering, part.ordering_assumed), (2, 2, Ordering::Nested, false));
-    assert_eq!((part.indexing, part.pixels, part.name.as_deref()), (Indexing::Explicit, 24, Some("CUT")));
-    assert_eq!(part.coordinates, Some(longan_formats::CoordinateSystem::Celestial));
+    assert_eq!(whole.place, TablePlace::Hdu { hdu: 1, name: None });
+    assert_eq!(part.place, TablePlace::Hdu { hdu: 2, name: Some("CUT".into()) });
+    let grid = |ordering, ordering_assumed, coordinates, indexing, pixels| GridDescription::Healpix {
+        nside: 2,
+        ordering,
+        ordering_assumed,
+        coordinates,
+        indexing,
+        pixels,
+    };
+    assert_eq!(whole.grid, grid(Ordering::Ring, true, None, Indexing::Implicit, 48));
+    let celestial = Some(CoordinateSystem::Celestial);
+    assert_eq!(part.grid, grid(Ordering::Nested, false, celestial, Indexing::Explicit, 24));
     let fields: Vec<_> = part.fields.iter().map(|f| (f.name.as_str(), f.unit.as_deref())).collect();
     assert_eq!(fields, [("T", Some("K_CMB")), ("S", None)]);
 }

@@ -81,7 +81,7 @@ fn what_is_written_is_read() {
         for (hdu, extension) in (1..).zip(&file.extensions) {
             for (number, column) in extension.columns.iter().enumerate() {
                 let field = Some(Field::Number(number));
-                let map = read(&path, &Selection { field, hdu: Some(hdu), nside: None }).unwrap();
+                let map = read(&path, &Selection { field, hdu: Some(hdu), ..Selection::default() }).unwrap();
                 assert_same(map.values(), &column.values);
                 assert_eq!((&map.name, map.ordering, map.grid()), (&column.name, file.ordering, file.grid));
                 assert_eq!(map.unit.unwrap_or_default(), column.unit);
@@ -90,7 +90,8 @@ fn what_is_written_is_read() {
         }
         let description = describe(&path).unwrap();
         assert_eq!(description.tables.len(), 2);
-        assert_eq!(description.tables[1].name.as_deref(), Some("TWO"));
+        let second = TablePlace::Hdu { hdu: 2, name: Some("TWO".into()) };
+        assert_eq!(description.tables[1].place, second);
         assert_eq!(fs::read(&path).unwrap().starts_with(&[0x1f, 0x8b]), name.ends_with(".gz"));
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), files().len());
@@ -192,6 +193,41 @@ fn the_same_map_gives_the_same_bytes() {
         });
         assert!(bytes[0] == bytes[1]);
     }
+}
+
+#[test]
+fn tables_one_by_one_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, file) in files() {
+        let (whole, parts) = (folder.path().join(&name), folder.path().join(format!("parts-{name}")));
+        write_healpix(&whole, &file, false).unwrap();
+        let HealpixFile { grid, ordering, coordinates, float32, extensions } = file;
+        save(&parts, false, |path| {
+            let mut writer = HealpixWriter::create(path, HealpixLayout { grid, ordering, coordinates, float32 })?;
+            for extension in &extensions {
+                writer.append(extension)?;
+            }
+            writer.finish()
+        })
+        .unwrap();
+        assert!(fs::read(whole).unwrap() == fs::read(parts).unwrap(), "{name}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2 * files().len());
+
+    // A table that cannot be written leaves no file behind.
+    let path = folder.path().join("bad.fits");
+    let file = file(3, Ordering::Ring, false);
+    let layout = HealpixLayout { grid: file.grid, ordering: file.ordering, coordinates: None, float32: false };
+    let (error, _) = problem(save(&path, false, |path| {
+        let mut writer = HealpixWriter::create(path, layout)?;
+        writer.append(&file.extensions[0])?;
+        let mut short = file.extensions[1].clone();
+        short.columns[1].values.pop();
+        writer.append(&short)?;
+        writer.finish()
+    }));
+    assert!(matches!(error, Error::ColumnLength { found: 107, nside: 3, expected: 108, .. }));
+    assert!(!path.exists());
 }
 
 #[test]
