@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use longan_formats::{Healpix, Map};
-use longan_measures::{Measure, Window};
+use longan_measures::{Measure, MeasureError, Window};
 
 use crate::contour::{Body, Field};
 use crate::moments::{Selection, Weight};
@@ -125,6 +125,34 @@ pub enum AnalysisError {
     /// Thresholds that do not work out.
     #[error(transparent)]
     Thresholds(#[from] ThresholdError),
+    /// A measure of tensors of another weight.
+    #[error(
+        "the measure '{measure}' is defined for tensors weighted by {}, and these are weighted by {}; choose the other weight",
+        named(*weight), named(other(*weight))
+    )]
+    Weight {
+        /// The measure.
+        measure: String,
+        /// The weight that it needs.
+        weight: Weight,
+    },
+    /// A measure that fails.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+}
+
+fn named(weight: Weight) -> &'static str {
+    match weight {
+        Weight::Length => "length",
+        Weight::Curvature => "curvature",
+    }
+}
+
+fn other(weight: Weight) -> Weight {
+    match weight {
+        Weight::Length => Weight::Curvature,
+        Weight::Curvature => Weight::Length,
+    }
 }
 
 /// Minkowski maps of one field for one window: one array a measure.
@@ -249,26 +277,19 @@ impl Analysis {
         if measures.is_empty() {
             return Err(AnalysisError::NoMeasure);
         }
-        let selection = self.selection(measures);
-        let evaluate = |moments: &Moments, values: &mut [f64]| {
-            let window = Window {
-                centre: (moments.centre.0.to_degrees(), moments.centre.1.to_degrees()),
-                masked_fraction: moments.masked_fraction,
-                area: moments.area,
-                length: moments.length,
-                curvature: moments.curvature,
-                psi0: match self.weight {
-                    Weight::Length => moments.length,
-                    Weight::Curvature => moments.curvature,
-                },
-                ranks: &selection.ranks,
-                psi: &moments.psi,
-            };
-            let masked = moments.masked_fraction >= 1.0 || moments.masked_fraction > self.max_masked;
-            for (value, measure) in values.iter_mut().zip(measures) {
-                let defined = if masked { None } else { measure.as_ref().evaluate(&window) };
-                *value = defined.unwrap_or(f64::NAN);
+        let selection = self.selection(measures)?;
+        let evaluate = |batch: &[Moments], values: &mut [f64]| {
+            let masked = |m: &Moments| m.masked_fraction >= 1.0 || m.masked_fraction > self.max_masked;
+            let unmasked = batch.iter().enumerate().filter(|(_, moments)| !masked(moments));
+            let (places, windows): (Vec<usize>, Vec<Window<'_>>) =
+                unmasked.map(|(i, m)| (i, self.window_of(m, &selection.ranks))).unzip();
+            let mut column = vec![f64::NAN; windows.len()];
+            values.fill(f64::NAN);
+            for (i, measure) in measures.iter().enumerate() {
+                measure.as_ref().evaluate_all(&windows, &mut column)?;
+                places.iter().zip(&column).for_each(|(place, value)| values[place * measures.len() + i] = *value);
             }
+            Ok::<(), MeasureError>(())
         };
         let field = Field::new(map.grid(), map.values(), &thresholds, self.body);
         let radii: Vec<f64> = self.windows.iter().map(|degrees| degrees.to_radians()).collect();
@@ -279,7 +300,7 @@ impl Analysis {
             radii: &radii,
             summation: self.summation,
         };
-        let all = windows.visit(measures.len(), evaluate, progress);
+        let all = windows.visit_batches(measures.len(), evaluate, progress)?;
         let maps = all.into_iter().zip(&self.windows).map(|(Windows { columns: values, ways }, &window)| {
             MinkowskiMaps { grid, window, thresholds: thresholds.clone(), of_map, values, ways }
         });
@@ -297,11 +318,32 @@ impl Analysis {
         Ok((thresholds, totals, masked))
     }
 
+    /// A window as measures see it.
+    fn window_of<'a>(&self, moments: &'a Moments, ranks: &'a [u32]) -> Window<'a> {
+        Window {
+            centre: (moments.centre.0.to_degrees(), moments.centre.1.to_degrees()),
+            masked_fraction: moments.masked_fraction,
+            area: moments.area,
+            length: moments.length,
+            curvature: moments.curvature,
+            psi0: match self.weight {
+                Weight::Length => moments.length,
+                Weight::Curvature => moments.curvature,
+            },
+            ranks,
+            psi: &moments.psi,
+        }
+    }
+
     /// The moments that some measure needs.
-    fn selection(&self, measures: &[impl AsRef<dyn Measure>]) -> Selection {
+    fn selection(&self, measures: &[impl AsRef<dyn Measure>]) -> Result<Selection, AnalysisError> {
         let mut selection = Selection { weight: self.weight, ..Selection::default() };
         let mut ranks = BTreeSet::new();
-        for needs in measures.iter().map(|m| m.as_ref().needs()) {
+        for measure in measures.iter().map(AsRef::as_ref) {
+            let needs = measure.needs();
+            if let Some(weight) = needs.weight.filter(|weight| *weight != self.weight) {
+                return Err(AnalysisError::Weight { measure: measure.name(), weight });
+            }
             selection.area |= needs.area;
             selection.length |= needs.length;
             selection.curvature |= needs.curvature;
@@ -314,6 +356,6 @@ impl Analysis {
             }
         }
         selection.ranks = ranks.into_iter().collect();
-        selection
+        Ok(selection)
     }
 }

@@ -10,15 +10,7 @@ use crate::cells::Pixel;
 use crate::contour::{Cell, Field, Segment, Sink, march};
 use crate::transport::Powers;
 
-/// What a segment weighs in the moments ψ_s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Weight {
-    /// Its length: ψ_s of the tensors W_1^{0,s}.
-    #[default]
-    Length,
-    /// Its turn: ψ_s of the curvature-weighted tensors W_2^{0,s}.
-    Curvature,
-}
+pub use longan_measures::Weight;
 
 /// Which moments to accumulate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

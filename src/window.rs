@@ -10,6 +10,7 @@ mod prefix;
 mod reach;
 
 use std::collections::VecDeque;
+use std::convert::Infallible;
 use std::ops::Range;
 
 use longan_formats::{Healpix, Ring};
@@ -32,6 +33,9 @@ const BLOCK: usize = 32;
 
 /// Rings to a block that is not divided further.
 const SMALLEST: usize = 2;
+
+/// Most windows that are visited together.
+const BATCH: usize = 256;
 
 /// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]
@@ -121,8 +125,31 @@ impl MovingWindows<'_> {
         &self,
         columns: usize,
         visit: impl Fn(&Moments, &mut [f64]) + Sync,
-        mut progress: impl FnMut(f64),
+        progress: impl FnMut(f64),
     ) -> Vec<Windows> {
+        let each = |batch: &[Moments], values: &mut [f64]| {
+            batch.iter().zip(values.chunks_exact_mut(columns)).for_each(|(moments, values)| visit(moments, values));
+            Ok::<(), Infallible>(())
+        };
+        match self.visit_batches(columns, each, progress) {
+            Ok(windows) => windows,
+            Err(never) => match never {},
+        }
+    }
+
+    /// The same, with many windows at a time: `visit` fills `columns` numbers for the first, then for the next.
+    ///
+    /// # Errors
+    /// The northernmost of `visit`, which ends the work.
+    ///
+    /// # Panics
+    /// As [`visit`](Self::visit).
+    pub fn visit_batches<E: Send>(
+        &self,
+        columns: usize,
+        visit: impl Fn(&[Moments], &mut [f64]) -> Result<(), E> + Sync,
+        mut progress: impl FnMut(f64),
+    ) -> Result<Vec<Windows>, E> {
         let input = self.field.grid();
         assert!(!self.radii.contains(&0.0) || self.output == input, "a window of one pixel needs the input's grid");
         let layout = Layout::new(self.selection, self.field.has_masked());
@@ -132,12 +159,12 @@ impl MovingWindows<'_> {
             let band = Band::new(self.field, &layout, first..(first + BAND).min(input.rings() + 1));
             for sweep in &mut sweeps {
                 sweep.add(&band);
-                sweep.visit_finished(band.rings.end, &visit);
+                sweep.visit_finished(band.rings.end, &visit)?;
             }
             let last = input.ring(band.rings.end - 1);
             progress((last.start + last.len) as f64 / input.pixels() as f64);
         }
-        sweeps.into_iter().map(|sweep| sweep.windows).collect()
+        Ok(sweeps.into_iter().map(|sweep| sweep.windows).collect())
     }
 }
 
@@ -200,12 +227,16 @@ impl<'a> Sweep<'a> {
     }
 
     /// Visits the windows that reach no farther than `end`.
-    fn visit_finished(&mut self, end: usize, visit: &(impl Fn(&Moments, &mut [f64]) + Sync)) {
+    fn visit_finished<E: Send>(
+        &mut self,
+        end: usize,
+        visit: &(impl Fn(&[Moments], &mut [f64]) -> Result<(), E> + Sync),
+    ) -> Result<(), E> {
         let Windows { columns, ways } = &mut self.windows;
         while self.groups.front().is_some_and(|group| group.reach.end <= end) {
             let Some(group) = self.groups.pop_front() else { break };
             let tasks = 4 * group.rings.len();
-            let values: Vec<Vec<f64>> = (0..tasks)
+            let values: Vec<Result<Vec<f64>, E>> = (0..tasks)
                 .into_par_iter()
                 .map(|task| {
                     let (ring, quadrant) = (task / 4, task % 4);
@@ -214,12 +245,14 @@ impl<'a> Sweep<'a> {
                     visited(&group.rings[ring], quadrant, sums, self.layout, thresholds, columns.len(), visit)
                 })
                 .collect();
+            let values = values.into_iter().collect::<Result<Vec<_>, E>>()?;
             let step = columns.len();
             for (i, column) in columns.iter_mut().enumerate() {
                 values.iter().for_each(|values| column.extend(values.iter().skip(i).step_by(step)));
             }
             ways.add(group.ways);
         }
+        Ok(())
     }
 }
 
@@ -308,40 +341,44 @@ impl Ways {
 }
 
 /// What `visit` makes of the windows of a quadrant.
-fn visited(
+fn visited<E>(
     ring: &OutputRing,
     quadrant: usize,
     sums: &Sums,
     layout: &Layout,
     thresholds: usize,
     columns: usize,
-    visit: impl Fn(&Moments, &mut [f64]),
-) -> Vec<f64> {
+    visit: impl Fn(&[Moments], &mut [f64]) -> Result<(), E>,
+) -> Result<Vec<f64>, E> {
     let mut out = vec![0.0; ring.in_quadrant * columns];
-    let mut moments = Moments::default();
-    for (k, out) in out.chunks_exact_mut(columns).enumerate() {
-        let sum = |row: usize| sums.data[k * sums.rows + row];
-        let mean = |row: usize| sum(row) / thresholds as f64;
-        let selected = |row: Option<usize>| row.map_or(0.0, mean);
-        moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
-        moments.masked_fraction = match (sums.pixels[k], layout.masked) {
-            (0, _) => 1.0,
-            (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
-            (_, None) => 0.0,
-        };
-        moments.area = selected(layout.area);
-        moments.length = selected(layout.length);
-        moments.curvature = selected(layout.curvature);
-        moments.psi.clear();
-        let rows = (layout.first_rank..layout.rows).step_by(2);
-        // |ψ_s| ≤ W1, which the error of prefix sums must not break where a contour is nearly straight.
-        let most =
-            if layout.weight == Weight::Length && layout.length.is_some() { moments.length } else { f64::INFINITY };
-        let bounded = |psi: Complex64| if psi.norm() > most { psi * (most / psi.norm()) } else { psi };
-        moments.psi.extend(rows.map(|row| bounded(Complex64::new(mean(row), mean(row + 1)))));
-        visit(&moments, out);
+    let mut batch = vec![Moments::default(); ring.in_quadrant.min(BATCH)];
+    for (number, out) in out.chunks_mut(BATCH * columns).enumerate() {
+        let batch = &mut batch[..out.len() / columns];
+        for (i, moments) in batch.iter_mut().enumerate() {
+            let k = number * BATCH + i;
+            let sum = |row: usize| sums.data[k * sums.rows + row];
+            let mean = |row: usize| sum(row) / thresholds as f64;
+            let selected = |row: Option<usize>| row.map_or(0.0, mean);
+            moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
+            moments.masked_fraction = match (sums.pixels[k], layout.masked) {
+                (0, _) => 1.0,
+                (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
+                (_, None) => 0.0,
+            };
+            moments.area = selected(layout.area);
+            moments.length = selected(layout.length);
+            moments.curvature = selected(layout.curvature);
+            moments.psi.clear();
+            let rows = (layout.first_rank..layout.rows).step_by(2);
+            // |ψ_s| ≤ W1, which the error of prefix sums must not break where a contour is nearly straight.
+            let most =
+                if layout.weight == Weight::Length && layout.length.is_some() { moments.length } else { f64::INFINITY };
+            let bounded = |psi: Complex64| if psi.norm() > most { psi * (most / psi.norm()) } else { psi };
+            moments.psi.extend(rows.map(|row| bounded(Complex64::new(mean(row), mean(row + 1)))));
+        }
+        visit(batch, out)?;
     }
-    out
+    Ok(out)
 }
 
 /// Sums over the windows about consecutive pixels.

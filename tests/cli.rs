@@ -5,14 +5,23 @@
 #[allow(dead_code)]
 mod bytes;
 
+/// Libraries from C.
+#[path = "../measures/tests/plugins/compile.rs"]
+#[allow(dead_code)]
+mod compile;
+
 /// Every family of files, from end to end.
 mod families;
+/// Measures as formulas.
+mod formulas;
 /// Fields on grids of latitude and longitude, made by hand.
 mod gridded;
 /// `longan map` on one input.
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
 mod names_and_streams;
+/// Measures from libraries, and `longan plugin`.
+mod plugins;
 /// What is refused, and in which words.
 mod refusals;
 /// `totals`, `info`, `measures`, `simulate` and `demo`.
@@ -74,6 +83,11 @@ impl Folder {
         names
     }
 
+    /// The path of the folder.
+    fn root(&self) -> &Path {
+        self.0.path()
+    }
+
     /// The program, in this folder, with words as a shell would split them.
     fn command(&self, words: &str) -> Command {
         self.command_of(&shlex::split(words).expect("quotes that match"))
@@ -82,6 +96,7 @@ impl Folder {
     fn command_of(&self, words: &[impl AsRef<std::ffi::OsStr>]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_longan"));
         command.args(words).current_dir(self.0.path()).stdin(Stdio::null());
+        command.env_remove("LONGAN_PLUGIN_PATH");
         command
     }
 
@@ -168,7 +183,8 @@ fn headers(fits: &[u8]) -> Vec<BTreeMap<String, String>> {
             if card.starts_with("END ") {
                 break;
             }
-            let Some((key, value)) = card.split_once("= ").or(card.split_once("CONTINUE")) else { continue };
+            let separator = if card.starts_with("CONTINUE") { "CONTINUE" } else { "= " };
+            let Some((key, value)) = card.split_once(separator) else { continue };
             let value = match value.trim().strip_prefix('\'') {
                 Some(text) => text.rsplit_once('\'').unwrap().0.replace("''", "'").trim_end().to_owned(),
                 None => value.split('/').next().unwrap().trim().to_owned(),

@@ -3,20 +3,22 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use longan::formats::{self, Error, Healpix, Map};
-use longan::measures::{BuiltIn, Measure, find};
+use longan::measures::{CatalogueError, Measure, split};
 use longan::statistics::{Statistics, statistics};
 use longan::window::{Summation, Ways};
 use longan::{Analysis, AnalysisError, MinkowskiMaps, Weight};
 
 use super::input::{self, Input, Mask};
+use super::misused;
 use super::options::{BodyOptions, Running, between, check_memory, decimals, nside, shown};
 use super::output::{Provenance, command};
+use super::plugin::Plugins;
 use super::progress::Progress;
 use super::sink::{self, Kind, OutputOptions};
 
@@ -29,6 +31,7 @@ use super::sink::{self, Kind, OutputOptions};
 Examples:
   longan map sky.fits -o evq.fits
   longan map sky.fits -o out.fits --measure evq,evq-direction,psi4,rank4-mid --mask mask.fits
+  longan map sky.fits -o out.fits --measure 'beta = (w1 - psi2)/(w1 + psi2)' --measure evq
   longan map sky.fits -o out.fits --thresholds -100,0,100 --sequence
   longan map rain.fits -o out.fits --thresholds log:0.1:100:7 --window 4 --nside-out 64
   longan map sky.fits -o out.fits --nside-out 512 --window 4,6,10 --verbose
@@ -47,9 +50,13 @@ pub(crate) struct Arguments {
     /// name for each (.fits in place of .csv or .ply, .nc in place of .zarr or .h5).
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
-    /// Measures, separated by commas, such as evq,psi2-direction; `longan measures` explains them all.
-    #[arg(long, value_name = "LIST", default_value = "evq")]
-    measure: Measures,
+    /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
+    /// "beta = (w1 - psi2)/(w1 + psi2)"; may be repeated. `longan measures` lists all measures, and
+    /// `longan measures --help` explains formulas [default: evq].
+    #[arg(long, value_name = "LIST")]
+    measure: Vec<String>,
+    #[command(flatten)]
+    plugins: Plugins,
     /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside. Several, such as
     /// 4,6,10, make an extension each, in NetCDF variables such as EVQ_WINDOW_4.
     #[arg(long, value_name = "DEG,...", default_value = "6", value_delimiter = ',')]
@@ -93,31 +100,8 @@ pub(crate) struct Arguments {
     verbose: bool,
 }
 
-/// Measures, no two the same.
-#[derive(Clone, Debug)]
-struct Measures(Vec<BuiltIn>);
-
 /// Columns that a FITS table can have.
 const COLUMNS_MAX: usize = 999;
-
-impl FromStr for Measures {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut measures: Vec<BuiltIn> = Vec::new();
-        for name in text.split(',') {
-            let measure = find(name.trim()).map_err(|e| e.to_string())?;
-            if measures.iter().any(|other| other.name() == measure.name()) {
-                return Err(format!("'{}' is given twice", measure.name()));
-            }
-            measures.push(measure);
-        }
-        if measures.len() > COLUMNS_MAX {
-            return Err(format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len()));
-        }
-        Ok(Measures(measures))
-    }
-}
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum WeightOption {
@@ -127,11 +111,12 @@ enum WeightOption {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
+    let measures = arguments.measures()?;
     let jobs = arguments.jobs()?;
     let mut mask = arguments.input.mask()?;
     let mut failed = Vec::new();
     for (input, output) in &jobs {
-        if let Err(error) = arguments.one(input, output, mask.as_mut()) {
+        if let Err(error) = arguments.one(input, output, mask.as_mut(), &measures) {
             if jobs.len() == 1 {
                 return Err(error);
             }
@@ -149,6 +134,36 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
+    /// The measures asked for, no two the same.
+    fn measures(&self) -> anyhow::Result<Vec<Arc<dyn Measure>>> {
+        let catalogue = self.plugins.catalogue()?;
+        let wrong = |text: &str, problem: String| {
+            misused("map", format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
+        };
+        let mut measures: Vec<Arc<dyn Measure>> = Vec::new();
+        for text in self.measure.iter().flat_map(|list| split(list)) {
+            let measure = catalogue.find(text).map_err(|e| match &e {
+                CatalogueError::Formula(formula) => wrong(text, format!("{e}\n\n{}", formula.marked())),
+                _ => wrong(text, e.to_string()),
+            })?;
+            if let Some(other) = measures.iter().find(|other| other.column().eq_ignore_ascii_case(&measure.column())) {
+                let [one, other] = [measure.name(), other.name()];
+                let twice = if one == other { "is given twice".into() } else { format!("has the column of '{other}'") };
+                return Err(wrong(text, format!("'{one}' {twice}")));
+            }
+            measures.push(measure);
+        }
+        if measures.len() > COLUMNS_MAX {
+            let problem =
+                format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len());
+            return Err(misused("map", problem));
+        }
+        if measures.is_empty() {
+            measures.push(catalogue.find("longan:evq")?);
+        }
+        Ok(measures)
+    }
+
     /// Inputs and their outputs, those that are finished left out, after all checks that need no reading.
     fn jobs(&self) -> anyhow::Result<Vec<(&Path, PathBuf)>> {
         let out = &self.output;
@@ -217,7 +232,13 @@ impl Arguments {
         }
     }
 
-    fn one(&self, path: &Path, output: &Path, mut mask: Option<&mut Mask>) -> anyhow::Result<()> {
+    fn one(
+        &self,
+        path: &Path,
+        output: &Path,
+        mut mask: Option<&mut Mask>,
+        measures: &[Arc<dyn Measure>],
+    ) -> anyhow::Result<()> {
         let start = Instant::now();
         let mut series = self.input.open(path)?;
         let steps = series.steps();
@@ -228,7 +249,6 @@ impl Arguments {
         let map = first.iter().next().context("a map")?;
         let grid = analysis.check(map.grid()).with_context(about)?;
         let layout = self.output_options.layout(map, grid, kind, steps).with_context(about)?;
-        let measures = &self.measure.0;
         let tables = analysis.windows.len() * if self.sequence { analysis.thresholds.values().len() } else { 1 };
         check_memory(grid, tables * measures.len()).with_context(about)?;
         let progress = Progress::new(about(), self.running.quiet);
@@ -276,7 +296,7 @@ impl Arguments {
             ));
         }
         let of = if steps > 1 { format!("{steps} steps of ") } else { String::new() };
-        let all = format!("{of}{} of Nside {}", self.measure.0[0].column(), grid.nside());
+        let all = format!("{of}{} of Nside {}", measures[0].column(), grid.nside());
         let seconds = start.elapsed().as_secs_f64();
         self.running.say(format_args!("{}: {all} {summary} ({seconds:.2} s)", shown(output)))
     }

@@ -11,6 +11,7 @@ mod map;
 mod measures;
 mod options;
 mod output;
+mod plugin;
 mod progress;
 mod regrid;
 mod simulate;
@@ -20,7 +21,8 @@ mod totals;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Shape on the sphere: Minkowski functionals and tensors of maps and other fields, in moving windows.
 ///
@@ -36,6 +38,7 @@ Examples:
   longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
   longan regrid stations.csv -o rainfall.fits --variable rain
+  longan plugin new beta                 a crate in Rust for a measure of one's own
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
 Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]
@@ -51,6 +54,7 @@ enum Command {
     Info(info::Arguments),
     Regrid(regrid::Arguments),
     Measures(measures::Arguments),
+    Plugin(plugin::Arguments),
     Simulate(simulate::Arguments),
     Demo(demo::Arguments),
 }
@@ -65,16 +69,31 @@ pub(crate) fn main() -> ExitCode {
         Command::Info(arguments) => info::run(&arguments),
         Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),
+        Command::Plugin(arguments) => plugin::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            let _ = writeln!(std::io::stderr(), "longan: {e:#}");
-            ExitCode::FAILURE
-        }
+        Err(e) => match e.downcast::<clap::Error>() {
+            Ok(misused) => {
+                let _ = misused.print();
+                ExitCode::from(2)
+            }
+            Err(e) => {
+                let _ = writeln!(std::io::stderr(), "longan: {e:#}");
+                ExitCode::FAILURE
+            }
+        },
     }
+}
+
+/// What clap says about an argument, for one that only makes sense together with others.
+fn misused(command: &str, problem: String) -> anyhow::Error {
+    let mut arguments = Arguments::command();
+    arguments.build();
+    let command = arguments.find_subcommand_mut(command).expect("a command of this program");
+    command.error(ErrorKind::ValueValidation, problem).into()
 }
 
 /// Removes unfinished files when the program is told to end, and then ends it in the way of that signal.

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use longan::formats::{Card, CardValue, Map, NetcdfColumn};
-use longan::measures::Measure;
+use longan::measures::{Measure, Origin};
 use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
 
 use super::input::Input;
@@ -50,9 +50,32 @@ pub(crate) fn creator() -> Card {
     text("CREATOR", concat!("longan ", env!("CARGO_PKG_VERSION")), "program that wrote this file")
 }
 
+/// Formulas and plugins that measures come from.
+fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
+    let (mut formulas, mut plugins) = (Vec::new(), Vec::new());
+    for measure in measures {
+        match measure.as_ref().origin() {
+            Origin::Formula(formula) => formulas.push(formula),
+            Origin::Plugin(plugin) if !plugins.contains(&plugin) => plugins.push(plugin),
+            Origin::Plugin(_) | Origin::Program => (),
+        }
+    }
+    let formulas =
+        (1..).zip(formulas).map(|(n, text)| self::text(&numbered("FORMULA", n), text, "formula of a column"));
+    let plugins = (1..).zip(plugins).map(|(n, text)| self::text(&numbered("PLUGIN", n), text, "plugin of measures"));
+    formulas.chain(plugins).collect()
+}
+
+/// A keyword with a number, within the eight characters of FITS: FORMULA1 to FORMULA9, FORMUL10 and so on.
+fn numbered(keyword: &str, number: usize) -> String {
+    let number = number.to_string();
+    let room = 8usize.saturating_sub(number.len()).min(keyword.len());
+    format!("{}{number}", &keyword[..room])
+}
+
 impl Provenance<'_> {
     /// What is written of the Minkowski maps of one step.
-    pub(crate) fn step(&self, maps: Vec<MinkowskiMaps>, measures: &[impl Measure]) -> Step {
+    pub(crate) fn step(&self, maps: Vec<MinkowskiMaps>, measures: &[impl AsRef<dyn Measure>]) -> Step {
         let windows = self.analysis.windows.len();
         let thresholds = maps.len() / windows;
         let name = |i: usize, window: f64| match (windows, thresholds) {
@@ -61,18 +84,22 @@ impl Provenance<'_> {
             (_, 1) => format!("WINDOW {window}"),
             (_, _) => format!("WINDOW {window} THRESHOLD {}", i % thresholds + 1),
         };
-        let attributes = self.attributes(&maps, thresholds > 1);
+        let origins = origins(measures);
+        let attributes = [self.attributes(&maps, thresholds > 1), origins.clone()].concat();
         let numbers = self.numbers(&maps[0]);
         let tables = maps.into_iter().enumerate().map(|(i, maps)| {
             let of = self.words(&maps, (thresholds > 1).then_some(i % thresholds));
             Table {
                 name: name(i, maps.window),
-                cards: self.cards(&maps),
-                columns: std::iter::zip(measures, maps.values)
+                cards: [self.cards(&maps), origins.clone()].concat(),
+                columns: std::iter::zip(measures.iter().map(AsRef::as_ref), maps.values)
                     .map(|(measure, values)| MapColumn {
                         name: measure.column(),
                         unit: measure.unit().to_owned(),
-                        long_name: format!("{} {of}", measure.definition()),
+                        long_name: match measure.origin() {
+                            Origin::Formula(formula) => formula,
+                            Origin::Program | Origin::Plugin(_) => format!("{} {of}", measure.definition()),
+                        },
                         values,
                     })
                     .collect(),

@@ -183,6 +183,7 @@ fn help_fits_a_terminal_and_its_examples_run() {
         "regrid --help",
         "info --help",
         "measures --help",
+        "plugin new --help",
         "demo --help",
     ] {
         let help = folder.done(words);

@@ -28,7 +28,7 @@ fn with_series() -> Folder {
 const WARNING: &str = "longan: series.nc: the map at 1997-12-04 is masked or constant, so the result is masked there\n";
 
 /// All steps of a variable.
-fn steps(folder: &Folder, name: &str, variable: &str) -> Vec<Map> {
+pub(super) fn steps(folder: &Folder, name: &str, variable: &str) -> Vec<Map> {
     let selection = Selection { field: Some(variable.parse::<Field>().unwrap()), ..Selection::default() };
     let mut maps = open(&folder.path(name), &selection).unwrap();
     (0..maps.times().len()).map(|step| maps.read(step).unwrap()).collect()
