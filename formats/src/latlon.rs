@@ -5,11 +5,11 @@
 
 use std::rc::Rc;
 
-use crate::cf::{self, Horizontal, Labels};
-use crate::dataset::{Dataset, Dimension, Kind, Variable};
+use crate::cf::{self, Horizontal};
+use crate::dataset::{Dataset, Kind, Variable};
 use crate::{
-    AxisDescription, DimensionDescription, Error, Field, FieldDescription, GridDescription, Healpix, LatLon, Map, Maps,
-    Selection, TableDescription, TablePlace, Time, Weights,
+    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Selection, TableDescription, Time,
+    Weights,
 };
 
 /// Lists name at most this many variables.
@@ -206,30 +206,12 @@ fn describe_one(dataset: &dyn Dataset, on_grid: &OnGrid) -> Result<TableDescript
     let variable = &dataset.variables()[on_grid.variable];
     let (grid, latitudes, longitudes) = grid(dataset, &on_grid.horizontal)?;
     let sphere = [on_grid.horizontal.latitude, on_grid.horizontal.longitude];
-    let others = variable.dimensions.iter().enumerate().filter(|(place, _)| !sphere.contains(place));
-    let describe = |(_, dimension): (usize, &Dimension)| {
-        let labels = Labels::of(dataset, variable, dimension)?;
-        Ok(DimensionDescription {
-            name: dimension.name.clone(),
-            len: dimension.len,
-            time: matches!(labels, Labels::Times(..)),
-            values: labels.listed(),
-        })
+    let grid = GridDescription::LatLon {
+        latitudes: axis(&latitudes),
+        longitudes: axis(&longitudes),
+        global: grid.is_global(),
     };
-    Ok(TableDescription {
-        place: TablePlace::Variable { variable: variable.path() },
-        grid: GridDescription::LatLon {
-            latitudes: axis(&latitudes),
-            longitudes: axis(&longitudes),
-            global: grid.is_global(),
-        },
-        dimensions: others.map(describe).collect::<Result<_, Error>>()?,
-        fields: vec![FieldDescription {
-            name: variable.name.clone(),
-            unit: variable.text("units").map(str::to_owned),
-            long_name: variable.text("long_name").map(str::to_owned),
-        }],
-    })
+    cf::describe(dataset, variable, &sphere, grid)
 }
 
 /// The values of a coordinate, of which there is at least one. Longitudes may cross 360 or ±180.

@@ -11,9 +11,9 @@ mod read;
 
 use std::rc::Rc;
 
-use crate::cf::{Labels, shape};
-use crate::dataset::{Dataset, Dimension, Kind, Variable};
-use crate::{DimensionDescription, Error, Field, FieldDescription, Maps, Selection, TableDescription, TablePlace};
+use crate::cf::{self, shape};
+use crate::dataset::{Dataset, Kind, Variable};
+use crate::{Error, Field, Maps, Selection, TableDescription};
 use grid::Grid;
 
 /// Finds the field that is selected; nothing where the dataset has no HEALPix field, or another field is named.
@@ -42,26 +42,7 @@ pub(crate) fn describe(dataset: &dyn Dataset) -> Result<Vec<TableDescription>, E
 
 fn describe_one(dataset: &dyn Dataset, variable: &Variable) -> Result<TableDescription, Error> {
     let grid = Grid::of(dataset, variable)?;
-    let others = variable.dimensions.iter().enumerate().filter(|(place, _)| *place != grid.dimension);
-    let describe = |(_, dimension): (usize, &Dimension)| {
-        let labels = Labels::of(dataset, variable, dimension)?;
-        Ok(DimensionDescription {
-            name: dimension.name.clone(),
-            len: dimension.len,
-            time: matches!(labels, Labels::Times(..)),
-            values: labels.listed(),
-        })
-    };
-    Ok(TableDescription {
-        place: TablePlace::Variable { variable: variable.path() },
-        grid: read::describe(dataset, variable, &grid)?,
-        dimensions: others.map(describe).collect::<Result<_, Error>>()?,
-        fields: vec![FieldDescription {
-            name: variable.name.clone(),
-            unit: variable.text("units").map(str::to_owned),
-            long_name: variable.text("long_name").map(str::to_owned),
-        }],
-    })
+    cf::describe(dataset, variable, &[grid.dimension], read::describe(dataset, variable, &grid)?)
 }
 
 /// The fields on a HEALPix grid, as places among the dataset's variables.
