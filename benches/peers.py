@@ -10,13 +10,13 @@ already, in an interpreter that has run it before.
 """
 
 import os
-import subprocess
 import sys
 import tempfile
 import time
 
 import healpy
 import numpy
+from processes import memory_of, seconds_of
 
 LONGAN = os.environ.get("LONGAN", "target/release/longan")
 LITCHI = os.environ.get("LITCHI")
@@ -30,20 +30,6 @@ def sky(nside):
     spectrum = numpy.zeros(3 * nside)
     spectrum[2:] = 1000 * 2 * numpy.pi / (l[2:] * (l[2:] + 1)) * (1 + 4 * numpy.exp(-(((l[2:] - 220) / 120) ** 2)))
     return healpy.synfast(spectrum, nside, fwhm=3 * healpy.nside2resol(nside))
-
-
-def seconds_of(*command):
-    """Wall-clock seconds of a process."""
-    start = time.perf_counter()
-    subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
-    return time.perf_counter() - start
-
-
-def memory_of(*command):
-    """Peak memory of a process in bytes, run from a small interpreter: a child counts its parent's memory too."""
-    run = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, check=True); "
-    show = "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
-    return 1024 * int(subprocess.check_output([sys.executable, "-c", run + show, *command]))
 
 
 def compare(nside, folder):

@@ -13,8 +13,9 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from statistics import median
+
+from processes import memory_of, seconds_of
 
 LONGAN = os.environ.get("LONGAN", "target/release/longan")
 ROUNDS = 5
@@ -27,20 +28,6 @@ xinc = 0.25
 yfirst = -89.875
 yinc = 0.25
 """
-
-
-def seconds_of(*command):
-    """Wall-clock seconds of a process."""
-    start = time.perf_counter()
-    subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
-    return time.perf_counter() - start
-
-
-def memory_of(*command):
-    """Peak memory of a process in bytes, run from a small interpreter: a child counts its parent's memory too."""
-    run = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, check=True); "
-    show = "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
-    return 1024 * int(subprocess.check_output([sys.executable, "-c", run + show, *command]))
 
 
 def cdo(*words):
