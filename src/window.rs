@@ -192,7 +192,7 @@ struct Group {
 
 impl<'a> Sweep<'a> {
     fn new(of: &'a MovingWindows<'a>, layout: &'a Layout, radius: f64, columns: usize) -> Self {
-        let columns = vec![Vec::new(); columns].into_iter().map(|_: Vec<f64>| Vec::with_capacity(of.output.pixels()));
+        let columns = (0..columns).map(|_| Vec::with_capacity(of.output.pixels()));
         let windows = Windows { columns: columns.collect(), ways: Ways::default() };
         let next = Some(OutputRing::new(of.field.grid(), of.output, 1, radius));
         Sweep { of, layout, radius, groups: VecDeque::new(), next, windows }

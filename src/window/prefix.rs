@@ -435,7 +435,10 @@ fn fill_plain(prefix: &mut Vec<f64>, row: &[f64], columns: Columns) {
 impl Spans {
     /// Nothing, for so many windows.
     fn empty(&mut self, windows: usize) {
-        (self.from, self.to) = (vec![0; windows], vec![0; windows]);
+        for ends in [&mut self.from, &mut self.to] {
+            ends.clear();
+            ends.resize(windows, 0);
+        }
     }
 
     /// Finds the pixels, counted from `first`, of an input ring in the windows about these pixels of an output ring, and
@@ -490,7 +493,7 @@ macro_rules! for_set {
     ($set:expr, $kernel:ident($($argument:expr),*)) => {
         match $set {
             8 => $kernel::<4, 8>($($argument),*),
-                16 => $kernel::<8, 16>($($argument),*),
+            16 => $kernel::<8, 16>($($argument),*),
             24 => $kernel::<12, 24>($($argument),*),
             32 => $kernel::<16, 32>($($argument),*),
             48 => $kernel::<24, 48>($($argument),*),
