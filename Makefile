@@ -10,18 +10,24 @@ export PKG_CONFIG_PATH := $(if $(PKG_CONFIG_PATH),$(PKG_CONFIG_PATH):)$(CONDA_PR
 export RUSTFLAGS += $(shell [ ! -e '$(CONDA_PREFIX)/lib/pkgconfig/cfitsio.pc' ] || echo '-Clink-arg=-Wl,-rpath,$(CONDA_PREFIX)/lib')
 endif
 
-# The folder that `make demo` writes, what `make bench` measures, and flags for every cargo command that resolves packages, such as --locked.
+# The folders that `make demo` writes and `make gallery` keeps its data in, what `make bench` measures, and flags for every cargo command that resolves packages, such as --locked.
 DEMO = demo
+GALLERY = gallery
 NSIDE = 512
 CARGOFLAGS =
 
-.PHONY: help demo test check licences bench install clean setup
+.PHONY: help demo gallery test check licences bench install clean setup
 
 help: ## list the targets
 	@awk -F':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: setup ## build longan and write its demonstration into demo/
 	cargo run --release --bin longan $(CARGOFLAGS) -- demo $(DEMO) --overwrite
+
+gallery: setup ## draw the figures of the README and the docs from data made in gallery/
+	cargo build --release --bin longan $(CARGOFLAGS)
+	cargo run --release --example gallery $(CARGOFLAGS) -- $(GALLERY)
+	tools/gallery target/release/longan $(GALLERY) docs/gallery
 
 # The tests come last, so that what the run ends with is their own summary.
 test: check ## run every check and test
@@ -56,7 +62,7 @@ install: setup ## install longan with cargo
 
 clean: ## remove what was built
 	cargo clean
-	rm -rf $(DEMO)
+	rm -rf $(DEMO) $(GALLERY)
 
 setup:
 	@tools/setup
