@@ -10,9 +10,10 @@ use longan_measures::{Measure, MeasureError, Window};
 
 use crate::contour::{Body, Field};
 use crate::moments::{Selection, Weight};
+use crate::region::Region;
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
-use crate::totals::{Totals, totals};
+use crate::totals::{Regional, Totals, totals, totals_within};
 use crate::window::{Moments, MovingWindows, Summation, Ways, Windows};
 
 /// What thresholds are counted in.
@@ -172,6 +173,15 @@ pub struct MinkowskiMaps {
     pub ways: Ways,
 }
 
+impl MinkowskiMaps {
+    /// The mean of a measure over some pixels of the grid where it is defined, and their number; NaN where there are none.
+    pub fn mean(&self, measure: usize, pixels: &[bool]) -> (f64, usize) {
+        let defined = self.values[measure].iter().zip(pixels).filter(|(value, within)| **within && !value.is_nan());
+        let (sum, windows) = defined.fold((0.0, 0), |(sum, n), (value, _)| (sum + value, n + 1));
+        (sum / windows as f64, windows)
+    }
+}
+
 impl Analysis {
     /// Checks all that can be checked without the field's values, before a long computation.
     ///
@@ -312,6 +322,16 @@ impl Analysis {
         let (thresholds, _) = self.thresholds_of(map)?;
         let (totals, masked) = totals(&Field::new(map.grid(), map.values(), &thresholds, self.body));
         Ok((thresholds, totals, masked))
+    }
+
+    /// The same over a region, or over the sphere.
+    ///
+    /// # Errors
+    /// See [`thresholds_of`](Self::thresholds_of).
+    pub fn totals_within(&self, map: &Map, region: Option<&Region>) -> Result<(Thresholds, Regional), AnalysisError> {
+        let (thresholds, _) = self.thresholds_of(map)?;
+        let regional = totals_within(&Field::new(map.grid(), map.values(), &thresholds, self.body), region);
+        Ok((thresholds, regional))
     }
 
     /// A window as measures see it.
