@@ -22,6 +22,9 @@ pub const PALETTE: [RGBColor; 7] = [
     RGBColor(230, 159, 0),
 ];
 
+/// The place of black in the [`PALETTE`].
+pub const BLACK: usize = 4;
+
 /// Letters, frames and ticks.
 pub const INK: RGBColor = RGBColor(30, 30, 30);
 
@@ -222,8 +225,10 @@ impl Axes {
         let Frame { left, top, width, height } = self.frame;
         let (right, bottom) = (left + width, top + height);
         let line = INK.stroke_width(stroke(self.em, 0.05));
-        let outline = Rectangle::new([(units(left), units(top)), (units(right), units(bottom))], line);
-        area.draw(&outline).map_err(failed)?;
+        // Once round and on, so that all corners are joined.
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top), (right, top)];
+        let outline = corners.map(|(x, y)| (units(x), units(y))).to_vec();
+        area.draw(&PathElement::new(outline, line)).map_err(failed)?;
         let letters = Letters::new(self.em * SMALL);
         let tick = TICK * self.em;
         let marks = self.y_marks();
