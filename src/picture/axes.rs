@@ -194,6 +194,16 @@ impl Axes {
         Ok(widths.collect::<Result<Vec<_>, _>>()?.into_iter().fold(0.0, f64::max) + TICK * self.em * 2.0)
     }
 
+    /// By how much the labels below the frame may reach beyond its ends, in pixels.
+    ///
+    /// # Errors
+    /// Where letters cannot be measured.
+    pub fn label_overhang(&self, area: &Area<'_>) -> Result<f64, Error> {
+        let letters = Letters::new(self.em * SMALL);
+        let widths = self.x_marks().labels.into_iter().map(|label| letters.width(area, &label));
+        Ok(widths.collect::<Result<Vec<_>, _>>()?.into_iter().fold(0.0, f64::max) / 2.0)
+    }
+
     /// Height of the labels below the frame, with their distance from it, in pixels.
     pub fn label_height(&self) -> f64 {
         self.em * (SMALL * LINE + TICK)

@@ -78,6 +78,8 @@ pub enum Sample {
     Bands,
     /// A dot.
     Dot,
+    /// Nothing: a text about all that is drawn.
+    None,
 }
 
 /// A chart.
@@ -124,22 +126,23 @@ impl Chart {
         let column_width = (f64::from(WIDTH) - GAP * em) / columns as f64;
         let mut axes: Vec<Axes> = self.panels.iter().map(|panel| self.axes(panel, em)).collect();
         // Frames of a column are as wide as the widest labels there allow.
-        let mut left = vec![0.0; columns];
+        let (mut left, mut right) = (vec![0.0; columns], 0.0);
         for (i, axes) in axes.iter_mut().enumerate() {
-            axes.frame.height = column_width * ASPECT * 0.8;
+            axes.frame = Frame { width: column_width * 0.8, height: column_width * ASPECT * 0.8, ..axes.frame };
             let label = axes.label_width(area)?;
             left[i % columns] = f64::max(left[i % columns], label);
+            right = f64::max(right, axes.label_overhang(area)?);
         }
+        let widest = left.iter().copied().fold(0.0, f64::max);
         let mut top = below_legend;
         for row in 0..count.div_ceil(columns) {
             top += 1.7 * em;
-            let widest = left.iter().copied().fold(0.0, f64::max);
-            let height = (column_width - widest - GAP * em) * ASPECT;
+            let height = (column_width - widest - right) * ASPECT;
             let mut below: f64 = 0.0;
             for i in row * columns..((row + 1) * columns).min(count) {
                 let column = i % columns;
                 let from = GAP * em + column as f64 * column_width;
-                let width = column_width - left[column] - GAP * em;
+                let width = column_width - left[column] - right;
                 axes[i].frame = Frame { left: from + left[column], top, width, height };
                 let lowest = i + columns >= count;
                 below = below.max(if lowest { axes[i].label_height() + 1.5 * em } else { 0.4 * em });
@@ -167,8 +170,8 @@ impl Chart {
         let (mut x, mut y) = (left, 0.9 * em);
         let mut entries = Vec::new();
         for (sample, text) in &self.legend {
-            let text = letters.shortened(area, text, right - left - SAMPLE * em)?;
-            let width = SAMPLE * em + letters.width(area, &text)?;
+            let text = letters.shortened(area, text, right - left - sample.width() * em)?;
+            let width = sample.width() * em + letters.width(area, &text)?;
             if x > left && x + width > right {
                 (x, y) = (left, y + 1.4 * em);
             }
@@ -188,6 +191,7 @@ impl Chart {
                 Sample::Line(colour) => line(area, path, em, PALETTE[colour % PALETTE.len()], false)?,
                 Sample::Dashed => line(area, path, em, INK, true)?,
                 Sample::Dot => dot(area, (units((x + end) / 2.0), units(*y)), em, INK)?,
+                Sample::None => (),
                 Sample::Bands => {
                     for (colour, half) in BANDS.iter().zip([0.45, 0.2]) {
                         let corners = [(units(*x), units(y - half * em)), (units(end), units(y + half * em))];
@@ -195,7 +199,7 @@ impl Chart {
                     }
                 }
             }
-            letters.write(area, text, (x + SAMPLE * em, *y), HPos::Left)?;
+            letters.write(area, text, (x + sample.width() * em, *y), HPos::Left)?;
         }
         Ok(())
     }
@@ -240,6 +244,13 @@ impl Chart {
             letters.write(area, &name, (left + width / 2.0, y), HPos::Center)?;
         }
         Ok(())
+    }
+}
+
+impl Sample {
+    /// Its width, in units of the letters' size.
+    fn width(self) -> f64 {
+        if self == Sample::None { 0.0 } else { SAMPLE }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The picture of a graph: a panel for each measure, curves of all maps, bands of the ensemble.
 
+use longan::Body;
 use longan::picture::axes::BLACK;
 use longan::picture::chart::{Band, Chart, Curve, Panel, Sample, Shared};
 
@@ -48,8 +49,14 @@ fn chart(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> Chart {
             legend.push((Sample::Dot, "outside 95 %".to_owned()));
         }
     }
+    if plan.analysis.body == Body::Below {
+        legend.push((Sample::None, "body below the threshold".to_owned()));
+    }
+    if let Some([longitude, latitude, radius]) = plan.region.map(|region| region.degrees()) {
+        legend.push((Sample::None, format!("within {radius}° of longitude {longitude}°, latitude {latitude}°")));
+    }
     let shared = Shared {
-        name: format!("threshold{}", if plan.body() == "below" { ", body below" } else { "" }),
+        name: "threshold".to_owned(),
         unit: unit.to_owned(),
         logarithmic: !plan.in_sigma() && evenly_in_logarithm(plan.analysis.thresholds.values()),
     };
