@@ -53,7 +53,9 @@ fn chart(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> Chart {
         legend.push((Sample::None, "body below the threshold".to_owned()));
     }
     if let Some([longitude, latitude, radius]) = plan.region.map(|region| region.degrees()) {
-        legend.push((Sample::None, format!("within {radius}° of longitude {longitude}°, latitude {latitude}°")));
+        let place = format!("within {radius}° of longitude {longitude}°, latitude {latitude}°");
+        // A true minus sign, as on the axes.
+        legend.push((Sample::None, place.replace('-', "−")));
     }
     let shared = Shared {
         name: "threshold".to_owned(),
