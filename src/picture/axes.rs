@@ -170,8 +170,8 @@ impl Axes {
             let longest = marks.labels.iter().map(|label| label.chars().count()).max().unwrap_or(0);
             ((longest + 2) * marks.labels.len()) as f64 <= room
         };
-        let all = (1..=MOST + 3).rev().map(|most| self.x.ticks(most));
-        all.clone().find(fits).or(all.last()).expect("some number of ticks")
+        let mut all = (1..=MOST + 3).rev().map(|most| self.x.ticks(most));
+        all.find(fits).unwrap_or_else(|| self.x.ticks(1))
     }
 
     fn y_marks(&self) -> Marks {

@@ -280,3 +280,56 @@ impl Layout {
         panel + self.columns >= self.axes.len()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Left end, right end and height of each text, in pixels; letters are taken to be as wide as they get on the mean.
+    fn texts(svg: &str) -> Vec<(f64, f64, f64)> {
+        let texts = svg.split("<text ").skip(1).map(|text| {
+            let number = |name: &str| {
+                let (_, rest) = text.split_once(&format!("{name}=\"")).unwrap();
+                rest.split_once('"').unwrap().0.parse::<f64>().unwrap() / 10.0
+            };
+            let letters = text.split_once('>').unwrap().1.split_once("</text>").unwrap().0.trim();
+            let width = 0.62 * number("font-size") * letters.chars().count() as f64;
+            let x = number(" x").max(0.0);
+            let left = match text {
+                _ if text.contains("\"middle\"") => x - width / 2.0,
+                _ if text.contains("\"end\"") => x - width,
+                _ => x,
+            };
+            (left, left + width, number(" y"))
+        });
+        texts.collect()
+    }
+
+    #[test]
+    fn no_chart_is_too_strange() {
+        let shared = Shared { name: "threshold".into(), unit: "kg m-2 s-1".into(), logarithmic: false };
+        for values in [[1e-9, 2e-9, 5e-9], [-1e300, 0.0, 1e300], [f64::NAN; 3], [7.0; 3], [1e5, f64::INFINITY, 2e5]] {
+            for (count, logarithmic) in [(1, false), (2, true), (3, false), (6, true)] {
+                let points = [1e-3, 1.0, 1e3].into_iter().zip(values).collect();
+                let curve = Curve { points, colour: 9, dashed: count == 3, marked: vec![0, 7] };
+                let band = Band { ends: vec![(1e-3, -1.0, values[0]), (1.0, values[1], f64::NAN)], inner: true };
+                let name =
+                    "a name that is far too long for the width of a panel or a chart, however wide ".repeat(count);
+                let panel = Panel { name: name.clone(), unit: "rad/sr".into(), bands: vec![band], curves: vec![curve] };
+                let samples = [Sample::Line(3), Sample::Dashed, Sample::Bands, Sample::Dot, Sample::None];
+                let legend = samples.into_iter().flat_map(|s| [(s, "short".to_owned()), (s, name.clone())]).collect();
+                let shared = Shared { logarithmic, ..shared.clone() };
+                let drawing = Chart { shared, panels: vec![panel; count], legend }.draw().unwrap();
+                let svg = drawing.svg();
+                assert!(!svg.contains("NaN") && !svg.contains("inf"));
+                let (_, height) = svg.split_once("height=\"").unwrap();
+                let height: f64 = height.split_once('"').unwrap().0.parse().unwrap();
+                for (left, right, y) in texts(svg) {
+                    let across = left > -0.02 * f64::from(WIDTH) && right < 1.02 * f64::from(WIDTH);
+                    assert!(across && y > 0.0 && y < height, "{count} panels of {values:?}: {left} to {right}, {y}");
+                }
+            }
+        }
+        assert!(matches!(Chart::default().draw(), Err(Error::NoPanels)));
+    }
+}

@@ -98,7 +98,7 @@ fn panel(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>, q: usize) ->
         let values = &curves.values[q];
         let outside = |t: &usize| {
             let percent = ensemble.map_or(f64::NAN, |ensemble| percentile(ensemble.at(q, *t), values[*t].value));
-            percent < 100.0 * BANDS[0] || percent > 100.0 * (1.0 - BANDS[0])
+            (percent - 50.0).abs() > 100.0 * (0.5 - BANDS[0])
         };
         let points = thresholds.clone().map(|t| (x(curves, t), values[t].value)).collect();
         panel.curves.push(Curve {
