@@ -14,6 +14,8 @@ mod compile;
 mod families;
 /// Measures as formulas.
 mod formulas;
+/// `longan graph`.
+mod graph;
 /// Fields on grids of latitude and longitude, made by hand.
 mod gridded;
 /// `longan map` on one input.

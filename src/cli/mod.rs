@@ -5,6 +5,7 @@
 //! file.
 
 mod demo;
+mod graph;
 mod info;
 mod input;
 mod map;
@@ -37,6 +38,7 @@ Examples:
   longan map sims/*.fits -o maps/        many maps, one output each
   longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
+  longan graph sky.fits -o graph.png     the same against threshold, drawn
   longan regrid stations.csv -o rainfall.fits --variable rain
   longan plugin new beta                 a crate in Rust for a measure of one's own
 
@@ -51,6 +53,7 @@ struct Arguments {
 enum Command {
     Map(map::Arguments),
     Totals(totals::Arguments),
+    Graph(graph::Arguments),
     Info(info::Arguments),
     Regrid(regrid::Arguments),
     Measures(measures::Arguments),
@@ -66,6 +69,7 @@ pub(crate) fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Map(arguments) => map::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),
