@@ -25,6 +25,7 @@ pub use colours::Colours;
 pub use image::Image;
 pub use overlay::{Circle, Mark, Overlays, Rods};
 pub use scale::{Colouring, Meaning};
+pub use ticks::superscript;
 pub use view::{Orientation, View};
 
 use panel::Prepared;

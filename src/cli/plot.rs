@@ -14,7 +14,7 @@ use longan::formats::{self, At, Error, Field, Map, Selection, Sphere};
 use longan::picture::projection::{self, Equirectangular, Gnomonic, Hammer, Mollweide, Orthographic, Projection};
 use longan::picture::{
     Circle, Colouring, Colours, Drawing, Mark, Meaning, Options, Orientation, Overlays, Rods, View, WIDTHS, contours,
-    draw,
+    draw, superscript,
 };
 use longan::{Body, Thresholds};
 
@@ -289,9 +289,8 @@ impl Arguments {
         // The title may have the name already.
         let is_said = self.title.is_none() && map.long_name.is_none();
         let unit = map.unit.as_deref().map(str::trim).filter(|unit| !["", "1"].contains(unit));
-        let unit = unit.map(|unit| if unit == "deg" { "degrees" } else { unit });
-        match unit {
-            Some(unit) if is_said => unit.to_owned(),
+        match unit.map(printed) {
+            Some(unit) if is_said => unit,
             Some(unit) => format!("{} [{unit}]", map.name.trim()),
             None if is_said => String::new(),
             None => map.name.trim().to_owned(),
@@ -315,6 +314,26 @@ impl Kind {
             Kind::Svg => drawing.svg().as_bytes().to_vec(),
         })
     }
+}
+
+/// A unit as it is printed: exponents are raised, as in m**2 s**-2, m^2 or m s-1, and u is micro.
+fn printed(unit: &str) -> String {
+    let word = |word: &str| {
+        let word = match word {
+            "deg" => return "degrees".to_owned(),
+            _ if word.starts_with("uK") => word.replacen('u', "µ", 1),
+            _ => word.replace("**", "^"),
+        };
+        let end = word.trim_end_matches(|c: char| c.is_ascii_digit() || c == '-' || c == '+');
+        let (base, exponent) = (end.trim_end_matches('^'), &word[end.len()..]);
+        match exponent.parse() {
+            Ok(exponent) if base.chars().last().is_some_and(char::is_alphabetic) => {
+                format!("{base}{}", superscript(exponent))
+            }
+            _ => word,
+        }
+    };
+    unit.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// Numbers parted by commas.
@@ -373,4 +392,43 @@ fn range(text: &str) -> Result<(Option<f64>, Option<f64>), String> {
 fn width(text: &str) -> Result<usize, String> {
     let width = text.parse().ok().filter(|width| WIDTHS.contains(width));
     width.ok_or_else(|| format!("not a whole number from {} to {}", WIDTHS.start(), WIDTHS.end()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_printed_with_raised_exponents() {
+        for (unit, expected) in [
+            ("m**2 s**-2", "m² s⁻²"),
+            ("kg m-2 s-1", "kg m⁻² s⁻¹"),
+            ("uK^2", "µK²"),
+            ("uK_CMB", "µK_CMB"),
+            ("K", "K"),
+            ("deg", "degrees"),
+            ("mm/day", "mm/day"),
+            ("1e-3", "1e-3"),
+            ("W/m2", "W/m²"),
+            ("sigma", "sigma"),
+            ("-", "-"),
+            ("", ""),
+        ] {
+            assert_eq!(printed(unit), expected);
+        }
+    }
+
+    #[test]
+    fn places_and_ranges_are_read() {
+        assert_eq!(range("-2,3.5"), Ok((Some(-2.0), Some(3.5))));
+        assert_eq!(range("0,"), Ok((Some(0.0), None)));
+        assert_eq!(range(",1e-5"), Ok((None, Some(1e-5))));
+        assert!(["", ",", "3", "3,2", "a,b", "nan,1"].iter().all(|text| range(text).is_err()));
+        assert_eq!(mark("10,-20"), Ok(Mark { at: (10.0, -20.0), label: String::new() }));
+        assert_eq!(mark(" 10, -20, a, b "), Ok(Mark { at: (10.0, -20.0), label: "a, b".to_owned() }));
+        assert!(["10", "10,100", "x,y,z", "400,0"].iter().all(|text| mark(text).is_err()));
+        assert_eq!(circle("1,2,6"), Ok(Circle { centre: (1.0, 2.0), radius: 6.0 }));
+        assert!(["1,2", "1,2,0", "1,2,180", "1,91,6", "1,2,3,4"].iter().all(|text| circle(text).is_err()));
+        assert!(middle("1,2,3").is_err() && middle("-180,90").is_ok());
+    }
 }

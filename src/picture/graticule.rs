@@ -3,7 +3,7 @@
 use std::f64::consts::SQRT_2;
 
 use glam::DVec3;
-use plotters::style::{BLACK, Color, WHITE};
+use plotters::style::{Color, RGBColor};
 
 use super::Error;
 use super::panel::Place;
@@ -22,6 +22,9 @@ const ROUND: [f64; 19] =
 
 /// Parallels across a picture of a part, at most.
 const ACROSS: f64 = 5.0;
+
+/// The latitude at which meridians end: nearer to the pole than is seen.
+const NEARLY_POLE: f64 = 90.0 - 5e-5;
 
 /// Points of a line.
 const POINTS: u16 = 360;
@@ -77,13 +80,11 @@ impl Graticule {
         let steps =
             |from: f64, to: f64| (0..=POINTS).map(move |i| from + (to - from) * f64::from(i) / f64::from(POINTS));
         let multiples = |from: f64, to: f64, step: f64| (from / step).ceil() as i64..=(to / step).floor() as i64;
-        let (south, north) = ((latitude - height).max(-90.0), (latitude + height).min(90.0));
+        // A pole by itself has no longitude.
+        let (south, north) = ((latitude - height).max(-NEARLY_POLE), (latitude + height).min(NEARLY_POLE));
         let (west, east) = (longitude - width, longitude + width);
         for k in multiples(south, north, parallels) {
             let lat = k as f64 * parallels;
-            if lat.abs() > 89.999 {
-                continue;
-            }
             let seen = view.line(steps(west, east).map(|lon| at(lon, lat)));
             let inside = vec![at(longitude, lat), at(longitude + 180.0, lat)];
             let name = latitude_name(lat, parallels, earthly);
@@ -120,12 +121,10 @@ impl Graticule {
     }
 
     pub(super) fn draw_lines(&self, pen: &Pen<'_, '_>, place: &Place<'_>, size: f64) -> Result<(), Error> {
-        for (colour, width) in [(WHITE.mix(0.35), size / 9.0), (BLACK.mix(0.4), size / 28.0)] {
-            for line in self.lines.iter().flat_map(|line| &line.seen) {
-                pen.line(&place.all(line), colour, width)?;
-            }
-        }
-        Ok(())
+        // Half way between black and white, so that it shows on dark colours and on light ones.
+        let colour = RGBColor(128, 128, 128).mix(0.75);
+        let seen = self.lines.iter().flat_map(|line| &line.seen);
+        seen.into_iter().try_for_each(|line| pen.line(&place.all(line), colour, size / 22.0))
     }
 
     /// Names the lines where there is room besides what is `taken`, within `sheet`.
@@ -179,13 +178,21 @@ impl Graticule {
 fn beside_frame(line: &Line, place: &Place<'_>, size: f64) -> Vec<Words> {
     let (a, b) = place.view.projection().half_extent();
     let near = |x: f64, edge: f64| (x - edge).abs() < 1e-6 * a;
-    let ends = || line.seen.iter().flat_map(|piece| [piece[0], piece[piece.len() - 1]]);
+    // The ends of the line with its directions there.
+    let ends = || {
+        let end = |at: (f64, f64), before: (f64, f64)| (at, (at.0 - before.0, at.1 - before.1));
+        line.seen.iter().flat_map(move |piece| {
+            let last = piece.len() - 1;
+            [end(piece[0], piece[1]), end(piece[last], piece[last - 1])]
+        })
+    };
     let words = |at: At, anchor: Anchor| Words { text: line.name.clone(), at, anchor, size };
-    let left = ends().filter(|&(x, _)| near(x, -a)).map(|end| {
+    // One that meets the edge at a small angle is not told by it.
+    let left = ends().filter(|&((x, _), (dx, dy))| near(x, -a) && dx.abs() > dy.abs()).map(|(end, _)| {
         let (x, y) = place.of_plane(end);
         words((x - GAP * size, y + 0.36 * size), Anchor::Right)
     });
-    let below = ends().filter(|&(_, y)| near(y, -b)).map(|end| {
+    let below = ends().filter(|&((_, y), (dx, dy))| near(y, -b) && dy.abs() > dx.abs()).map(|(end, _)| {
         let (x, y) = place.of_plane(end);
         words((x, y + (GAP + 0.8) * size), Anchor::Middle)
     });
@@ -206,7 +213,7 @@ fn beside_disc(line: &Line, place: &Place<'_>, size: f64) -> Vec<Words> {
     let words = |end: (f64, f64)| {
         let (x, y) = place.of_plane(end);
         // Above the line in the north, below it in the south: the outline goes that way.
-        let lift = 0.36 - 0.5 * end.1 / place.view.projection().half_extent().1;
+        let lift = 0.36 - 0.75 * end.1 / place.view.projection().half_extent().1;
         Words { text: line.name.clone(), at: (x - GAP * size, y + lift * size), anchor: Anchor::Right, size }
     };
     leftmost.map(words).into_iter().collect()

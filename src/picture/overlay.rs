@@ -22,7 +22,7 @@ const POINTS: u32 = 720;
 const RESOLUTION: f64 = 0.3;
 
 /// Rods are no nearer to one another than this share of the panel's width.
-const ROD_SPACING: f64 = 1.0 / 75.0;
+const ROD_SPACING: f64 = 1.0 / 60.0;
 
 /// The length of a rod as a share of their distance, so that they do not touch.
 const ROD_LENGTH: f64 = 0.72;
@@ -108,7 +108,7 @@ impl Overlays {
         let contours: Vec<_> = self.lines.iter().flat_map(|line| seen(place, line.iter().copied())).collect();
         on_any_colour(pen, &contours, size / 14.0)?;
         if let Some(rods) = &self.rods {
-            on_any_colour(pen, &rods.seen(place), size / 11.0)?;
+            on_any_colour(pen, &rods.seen(place), size / 13.0)?;
         }
         let circles: Vec<_> = self.circles.iter().flat_map(|circle| seen(place, circle.points())).collect();
         on_any_colour(pen, &circles, size / 9.0)?;
@@ -186,7 +186,7 @@ fn thinned(line: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 /// Dark lines with a light seam.
 fn on_any_colour(pen: &Pen<'_, '_>, lines: &[Vec<(f64, f64)>], width: f64) -> Result<(), Error> {
     for line in lines {
-        pen.line(line, WHITE.mix(0.6), 2.4 * width)?;
+        pen.line(line, WHITE.mix(0.6), 2.2 * width)?;
     }
     for line in lines {
         pen.line(line, INK, width)?;

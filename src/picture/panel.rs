@@ -107,7 +107,7 @@ impl<'a> Prepared<'a> {
         let title = fitted(&options.title, room, (TITLE * width, smallest), TITLE_LINES);
         let (label, _) = fitted(&options.label, room, (text, text), LABEL_LINES);
         let graticule = options.graticule.then(|| Graticule::new(&options.view));
-        let (left, below) = graticule.as_ref().map_or((0.0, 0.0), |graticule| graticule.room(text));
+        let (left, below) = graticule.as_ref().map_or((0.0, 0.0), |graticule| graticule.room(smallest));
         let is_rectangle = options.view.projection().is_rectangle();
         let right = if is_rectangle { 0.8 * text } else { left };
         let map_left = (margin + left).round();
@@ -163,7 +163,7 @@ impl<'a> Prepared<'a> {
         }
         let mut taken = self.options.overlays.draw_names(&pen, &place, self.text, &sheet)?;
         if let Some(graticule) = &self.graticule {
-            graticule.draw_names(&pen, &place, self.text, &sheet, &mut taken)?;
+            graticule.draw_names(&pen, &place, SMALLEST * self.size.0 as f64, &sheet, &mut taken)?;
         }
         self.bar.draw(&pen, &self.scale)
     }

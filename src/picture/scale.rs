@@ -11,6 +11,10 @@ use super::colours::Colours;
 /// Share of the values below and above the default colour range, each.
 const TAIL: f64 = 0.01;
 
+/// The default range ends at most this many times the distance of the quartiles beyond them, though more than [`TAIL`]
+/// of the values lie there: a normal distribution ends at 1.2 times.
+const FENCE: f64 = 10.0;
+
 /// Largest magnitude of a colour range's ends, for which no sum or power of ten overflows.
 pub(super) const LIMIT: f64 = 1e300;
 
@@ -178,7 +182,7 @@ impl Scale {
     }
 }
 
-/// The central 1 − 2 [`TAIL`] of the values; all of them where that has no width; something around a constant.
+/// The central 1 − 2 [`TAIL`] of the values, but not what is within no [`FENCE`]; all of them where that has no width; something around a constant.
 fn default_range(values: &mut [f64], log: bool) -> (f64, f64) {
     if values.is_empty() {
         return if log { (1.0, 10.0) } else { (0.0, 1.0) };
@@ -186,7 +190,11 @@ fn default_range(values: &mut [f64], log: bool) -> (f64, f64) {
     let last = values.len() - 1;
     let mut at =
         |quantile: f64| *values.select_nth_unstable_by((last as f64 * quantile).round() as usize, f64::total_cmp).1;
-    let (low, high) = (at(TAIL), at(1.0 - TAIL));
+    let (lower, upper) = (at(0.25), at(0.75));
+    // Halves, so that differences of the largest numbers stay finite.
+    let reach = if log { f64::INFINITY } else { FENCE * (0.5 * upper - 0.5 * lower) * 2.0 };
+    let fence = if reach > 0.0 { reach } else { f64::INFINITY };
+    let (low, high) = (at(TAIL).max(lower - fence), at(1.0 - TAIL).min(upper + fence));
     let (low, high) = if low < high { (low, high) } else { (at(0.0), at(1.0)) };
     if (high - low).is_normal() {
         return (low, high);
@@ -224,6 +232,9 @@ mod tests {
         assert_eq!((scale.low, scale.high, scale.below, scale.above), (10.0, 990.0, true, true));
         assert!(scale.masked);
         assert_eq!([values[1001], f64::INFINITY, UNSEEN].map(|v| scale.colour(v)), [MASKED; 3]);
+        // Values far away from all others, even if not so few.
+        let values: Vec<f64> = (0..1000).map(|i| if i < 960 { f64::from(i % 97) } else { 1e7 }).collect();
+        assert!(range(&values).1 < 1000.0);
         // A body too small for the percentiles still shows.
         let mut values = vec![0.0; 1000];
         values[7] = 1.0;

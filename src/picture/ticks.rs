@@ -114,7 +114,7 @@ pub(super) fn signed(number: String) -> String {
 }
 
 /// An integer in raised digits.
-pub(super) fn superscript(number: i32) -> String {
+pub fn superscript(number: i32) -> String {
     let digit = |c: char| match c.to_digit(10) {
         Some(d) => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize],
         None => '⁻',
