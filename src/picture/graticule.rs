@@ -143,9 +143,9 @@ impl Graticule {
                 if self.is_rectangle { beside_frame(line, place, size) } else { beside_disc(line, place, size) };
             let is_free = |words: &Words, taken: &[Frame]| {
                 let frame = words.frame();
-                sheet.holds(&frame) && !taken.iter().any(|other| other.overlaps(&frame))
+                sheet.holds(&frame) && !taken.iter().any(|other| other.overlaps(&frame.wider(GAP * size)))
             };
-            let is_outside = |words: &&Words| !words.frame().corners().iter().any(|&corner| place.covers(corner));
+            let is_outside = |words: &&Words| !words.frame().rim().iter().any(|&at| place.covers(at));
             if let Some(words) = outside.iter().filter(is_outside).find(|words| is_free(words, taken)) {
                 taken.push(words.frame());
                 pen.words(words)?;
@@ -159,7 +159,7 @@ impl Graticule {
                 let Some((x, y)) = place.pixel(at) else { continue };
                 let at = (x + GAP * size, y + if line.is_meridian { 1.1 } else { -GAP } * size);
                 let words = Words { text: line.name.clone(), at, anchor: Anchor::Left, size };
-                let is_inside = words.frame().corners().iter().all(|&corner| place.covers(corner));
+                let is_inside = words.frame().rim().iter().all(|&at| place.covers(at));
                 if is_inside && is_free(&words, taken) {
                     taken.push(words.frame());
                     pen.words_on_map(&words)?;

@@ -47,6 +47,17 @@ impl Frame {
         [(left, top), (right, top), (right, bottom), (left, bottom)]
     }
 
+    /// Points along its upper and lower side.
+    pub(super) fn rim(&self) -> [At; 10] {
+        let along = |i: usize| self.left + self.width * (i % 5) as f64 / 4.0;
+        std::array::from_fn(|i| (along(i), if i < 5 { self.top } else { self.bottom() }))
+    }
+
+    /// The rectangle with this much more to the left and to the right.
+    pub(super) fn wider(&self, by: f64) -> Frame {
+        Frame { left: self.left - by, width: self.width + 2.0 * by, ..*self }
+    }
+
     pub(super) fn overlaps(&self, other: &Frame) -> bool {
         self.left < other.right() && other.left < self.right() && self.top < other.bottom() && other.top < self.bottom()
     }

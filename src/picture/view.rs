@@ -152,22 +152,37 @@ impl View {
     }
 }
 
-/// The arc from `a` to `b`, or both its parts where it crosses the cut.
+/// The arc from `a` to `b`, or both its parts where it crosses the cut. None ends on the cut itself, where rounding would
+/// decide on its side.
 fn parts(cut: Cut, a: DVec3, b: DVec3) -> [Option<(DVec3, DVec3)>; 2] {
-    let (across, from, to) = match cut {
-        Cut::Meridian => (DVec3::Y, a.y, b.y),
-        Cut::Limb => (DVec3::X, a.x, b.x),
+    let across = match cut {
+        Cut::Meridian => DVec3::Y,
+        Cut::Limb => DVec3::X,
     };
-    if (from < 0.0) == (to < 0.0) {
-        return [Some((a, b)), None];
+    let (from, to) = (across.dot(a), across.dot(b));
+    let side = |off: f64| if off < 0.0 { -1.0 } else { 1.0 };
+    // The side of a point on the cut is that of the other end.
+    let is_on = |at: DVec3, off: f64| off.abs() < BESIDE && (cut == Cut::Limb || at.x < 0.0);
+    let (from_side, to_side) = match (is_on(a, from), is_on(b, to)) {
+        (true, true) => (1.0, 1.0),
+        (true, false) => (side(to), side(to)),
+        (false, true) => (side(from), side(from)),
+        (false, false) => (side(from), side(to)),
+    };
+    let beside = |at: DVec3, side: f64| at + across * (BESIDE * side - across.dot(at));
+    let whole = || {
+        let a = if is_on(a, from) { beside(a, from_side) } else { a };
+        let b = if is_on(b, to) { beside(b, to_side) } else { b };
+        [Some((a, b)), None]
+    };
+    if from_side == to_side {
+        return whole();
     }
-    let crossing = (a * to - b * from) * (to - from).signum();
+    let crossing = ((a * to - b * from) * to_side).normalize_or(a);
     if cut == Cut::Meridian && crossing.x > 0.0 {
-        return [Some((a, b)), None];
+        return whole();
     }
-    let beside = |side: f64| (crossing.normalize_or(a) + across * BESIDE.copysign(side)).normalize();
-    let sides = if from < 0.0 { (-1.0, 1.0) } else { (1.0, -1.0) };
-    [Some((a, beside(sides.0))), Some((beside(sides.1), b))]
+    [Some((a, beside(crossing, from_side))), Some((beside(crossing, to_side), b))]
 }
 
 #[cfg(test)]
@@ -255,6 +270,26 @@ mod tests {
         let across = view.line([vector(1.57, -1.0), vector(1.57, 0.0), vector(1.57, 1.0)]);
         let half = 30f64.to_radians().tan();
         assert!((across[0][0].0 + half).abs() < 1e-12 && (across[0].last().unwrap().0 - half).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_point_on_the_cut_is_on_the_side_that_the_line_comes_from() {
+        // The equator and a meridian touch the limb, and the cut, at points of theirs.
+        for projection in [Arc::new(Orthographic) as Arc<dyn Projection>, Arc::new(Mollweide)] {
+            for orientation in [Orientation::EastLeft, Orientation::EastRight] {
+                let view = View::new(projection.clone(), (0.0, 0.0), orientation).unwrap();
+                for lat in [-60, -30, 0, 50] {
+                    let at = |lon: i32| vector(f64::from(90 - lat).to_radians(), f64::from(lon).to_radians());
+                    let pieces = view.line((-180..=180).map(at));
+                    let longest = |piece: &Vec<(f64, f64)>| {
+                        let steps = piece.windows(2).map(|w| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1));
+                        steps.fold(0.0, f64::max)
+                    };
+                    assert!(pieces.iter().all(|piece| longest(piece) < 0.1), "{view:?} {lat}: {pieces:?}");
+                    assert!((1..=3).contains(&pieces.len()), "{view:?} {lat}: {}", pieces.len());
+                }
+            }
+        }
     }
 
     #[test]
