@@ -83,7 +83,7 @@ impl FromStr for Colours {
 /// Lightness in the middle of the cyclic map's two arms, how far it goes to either side, and the arms' colourfulness
 /// there.
 const LIGHTNESS: (f64, f64) = (0.56, 0.33);
-const CHROMA: f64 = 0.125;
+const CHROMA: f64 = 0.105;
 
 /// Hues of the arms in OKLab, blue and brown: apart for the colour-blind too.
 const HUES: [f64; 2] = [255.0, 55.0];
@@ -175,7 +175,7 @@ mod tests {
     fn the_cyclic_map_has_even_steps() {
         // In the space that it is made in, whose distances are those that are seen.
         let at = |i: u16| {
-            let turn = along_ellipse(f64::from(i) / 100.0);
+            let turn = along_ellipse(f64::from(i % 100) / 100.0);
             let hue = HUES[usize::from(turn.sin() < 0.0)].to_radians();
             let chroma = CHROMA * turn.sin().abs();
             [LIGHTNESS.0 + LIGHTNESS.1 * turn.cos(), chroma * hue.cos(), chroma * hue.sin()]

@@ -48,6 +48,8 @@ struct Line {
 pub(super) struct Graticule {
     lines: Vec<Line>,
     is_rectangle: bool,
+    /// Whether another parallel than the equator may end where the outline is widest.
+    is_tilted: bool,
 }
 
 impl Graticule {
@@ -55,7 +57,8 @@ impl Graticule {
         let (longitude, latitude) = view.centre();
         let at = |lon: f64, lat: f64| vector((90.0 - lat).to_radians(), lon.to_radians());
         let is_part = view.projection().cut() == Cut::Limb && view.projection().is_rectangle();
-        let mut graticule = Graticule { lines: Vec::new(), is_rectangle: view.projection().is_rectangle() };
+        let mut graticule =
+            Graticule { lines: Vec::new(), is_rectangle: view.projection().is_rectangle(), is_tilted: latitude != 0.0 };
         // Half the height of what is seen in latitude, and half its width in longitude.
         let (mut height, mut width) = (180.0, 180.0);
         let (mut parallels, mut meridians) = (PARALLELS, MERIDIANS);
@@ -73,7 +76,7 @@ impl Graticule {
             let finest = ROUND[ROUND.len() - 1];
             let round = |least: f64| ROUND.into_iter().rev().find(|step| *step >= least).unwrap_or(ROUND[0]);
             parallels = round(side / ACROSS).max(finest);
-            let shrunk = latitude.to_radians().cos().max(0.01);
+            let shrunk = latitude.to_radians().cos();
             meridians = if width == 180.0 { MERIDIANS / 2.0 } else { round(side / ACROSS / shrunk) };
         }
         let earthly = view.orientation() == Orientation::EastRight;
@@ -114,7 +117,7 @@ impl Graticule {
     /// The room that names take to the left of the map and below it.
     pub(super) fn room(&self, size: f64) -> (f64, f64) {
         if !self.is_rectangle {
-            return (1.7 * size, 0.0);
+            return (if self.is_tilted { 2.7 } else { 1.7 } * size, 0.0);
         }
         let widest = self.lines.iter().map(|line| width(&line.name, size)).fold(0.0, f64::max);
         (widest + 2.0 * GAP * size, 1.4 * size)
@@ -270,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_part_of_the_sphere_has_a_few_lines() {
-        for size in [0.001, 0.3, 2.0, 10.0, 45.0, 120.0] {
+        for size in [0.01, 0.3, 2.0, 10.0, 45.0, 120.0] {
             for centre in [(0.0, 0.0), (179.9, 50.0), (10.0, -88.0), (0.0, 90.0), (359.0, -89.99)] {
                 let view = View::new(Arc::new(Gnomonic::new(size).unwrap()), centre, Orientation::EastLeft).unwrap();
                 let lines = Graticule::new(&view).lines;

@@ -130,6 +130,17 @@ impl<'a> Prepared<'a> {
         Ok(Prepared { options, size, text, title, map, bar, scale, graticule, images })
     }
 
+    /// Where the map lies.
+    pub(super) fn place(&self) -> Place<'_> {
+        Place { view: &self.options.view, frame: self.map, panel: self.size.0 as f64 }
+    }
+
+    /// Which colours values have.
+    #[cfg(test)]
+    pub(super) fn scale(&self) -> &Scale {
+        &self.scale
+    }
+
     /// The images, for a panel that begins `at`.
     pub(super) fn images(&self, at: At) -> [Placed<'_>; 2] {
         let placed = |image, frame: Frame| Placed {
@@ -146,8 +157,10 @@ impl<'a> Prepared<'a> {
     pub(super) fn draw(&self, area: &Area<'_>, at: At) -> Result<(), Error> {
         let pen = Pen { area, at };
         let view = &self.options.view;
-        let place = Place { view, frame: self.map, panel: self.size.0 as f64 };
-        let sheet = Frame { left: 0.0, top: 0.0, width: self.size.0 as f64, height: self.bar.frame.top };
+        let place = self.place();
+        let (edge, width) = (0.3 * self.text, self.size.0 as f64);
+        let top = 0.7 * self.text + self.title.0.len() as f64 * LINE * self.title.1;
+        let sheet = Frame { left: edge, top, width: width - 2.0 * edge, height: self.bar.frame.top - top };
         let (title, size) = &self.title;
         for (i, line) in title.iter().enumerate() {
             let baseline = 0.7 * self.text + (0.8 + i as f64 * LINE) * size;

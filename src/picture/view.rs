@@ -235,7 +235,7 @@ mod tests {
     fn lines_are_seen_in_short_steps_only() {
         // A circle about each of many points: no step of it in the plane may be long.
         for view in views() {
-            let (a, _) = view.projection().half_extent();
+            let (a, b) = view.projection().half_extent();
             for k in 0..40 {
                 let middle = vector(PI * f64::from(k) / 39.0, 2.4 * f64::from(k));
                 let (one, other) = (middle.any_orthonormal_vector(), middle.cross(middle.any_orthonormal_vector()));
@@ -244,7 +244,9 @@ mod tests {
                 for piece in view.line(circle) {
                     for step in piece.windows(2) {
                         let length = (step[1].0 - step[0].0).hypot(step[1].1 - step[0].1);
-                        assert!(length < 0.1 * a, "{view:?} {middle}: {step:?}");
+                        // Near the pole of a cylinder a short way may be far around.
+                        let polar = step[0].1.abs() > 0.97 * b && view.projection().is_rectangle();
+                        assert!(polar || length < 0.1 * a, "{view:?} {middle}: {step:?}");
                         assert!(step[0].0.abs() <= a * (1.0 + 1e-12), "{view:?} {middle}");
                     }
                 }
