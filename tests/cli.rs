@@ -22,6 +22,8 @@ mod gridded;
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
 mod names_and_streams;
+/// `longan plot`.
+mod plot;
 /// Measures from libraries, and `longan plugin`.
 mod plugins;
 /// What is refused, and in which words.

@@ -10,6 +10,8 @@ mod healpy;
 mod invariants;
 /// A slow, obvious implementation judges the fast one.
 mod oracle;
+/// Pictures that look as they did.
+mod pictures;
 /// Expected values from an independent implementation, and litchi's, for the data in `LONGAN_SHARED`.
 mod reference;
 /// Bodies and fields whose measures are known in closed form.

@@ -8,8 +8,8 @@ use std::rc::Rc;
 use crate::cf::{self, Horizontal};
 use crate::dataset::{Dataset, Kind, Variable};
 use crate::{
-    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Selection, TableDescription, Time,
-    Weights,
+    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Selection, Sphere, TableDescription,
+    Time, Weights,
 };
 
 /// Lists name at most this many variables.
@@ -84,6 +84,7 @@ impl Maps for Series {
         map.unit = variable.text("units").map(str::to_owned);
         map.long_name = variable.text("long_name").map(str::to_owned);
         map.time = self.times().get(step).cloned();
+        map.sphere = Sphere::Earth;
         Ok(map)
     }
 

@@ -38,7 +38,7 @@ pub use adapter::{
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
-pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Sphere, Time, UNSEEN, is_bad};
 pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
 pub use regrid::{LatLon, Weights};
 pub use save::{abandon, check_writable, save};

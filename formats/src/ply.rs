@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::columns::{self, Column, shown};
 use crate::directions::FARTHEST;
 use crate::surface::Surface;
-use crate::{Adapter, Description, Error, Map, Maps, Regrid, Selection, Time, UNSEEN, is_bad};
+use crate::{Adapter, Description, Error, Map, Maps, Regrid, Selection, Sphere, Time, UNSEEN, is_bad};
 
 /// No line of a header is longer than this, and no number in a text.
 const LONGEST: u64 = 1 << 16;
@@ -95,6 +95,7 @@ impl Maps for One {
     fn read(&mut self, _: usize) -> Result<Map, Error> {
         let mut map = self.surface.map(self.nside, &self.regrid)?;
         map.name = self.name.clone();
+        map.sphere = Sphere::Body;
         Ok(map)
     }
 

@@ -15,7 +15,7 @@ use super::options::{between, finite, nside, whole};
 pub(crate) struct Input {
     /// Variable or column: its name, or its number counted from 0 as healpy does [default: the first of a FITS table; of
     /// other files the only one].
-    #[arg(long = "variable", visible_alias = "field", value_name = "NAME|NUMBER", value_parser = field)]
+    #[arg(long = "variable", visible_aliases = ["field", "column"], value_name = "NAME|NUMBER", value_parser = field)]
     pub(crate) field: Option<Field>,
     /// Place along a dimension, by the value of its coordinate or by its number from 0, such as level=500,
     /// time=1997-12 or time=#0; may be repeated. Without a place in time there is a map for each step.

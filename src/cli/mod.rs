@@ -12,6 +12,7 @@ mod map;
 mod measures;
 mod options;
 mod output;
+mod plot;
 mod plugin;
 mod progress;
 mod regrid;
@@ -37,6 +38,7 @@ Examples:
   longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
   longan map sims/*.fits -o maps/        many maps, one output each
   longan map era5.nc -o evq.nc --variable z --select level=500
+  longan plot sky_evq.fits -o evq.png    a picture of a map, PNG or SVG
   longan totals sky.fits                 area, length and Euler characteristic
   longan graph sky.fits -o graph.png     the same against threshold, drawn
   longan regrid stations.csv -o rainfall.fits --variable rain
@@ -54,6 +56,7 @@ enum Command {
     Map(map::Arguments),
     Totals(totals::Arguments),
     Graph(graph::Arguments),
+    Plot(plot::Arguments),
     Info(info::Arguments),
     Regrid(regrid::Arguments),
     Measures(measures::Arguments),
@@ -70,6 +73,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Map(arguments) => map::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
         Command::Graph(arguments) => graph::run(&arguments),
+        Command::Plot(arguments) => plot::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),

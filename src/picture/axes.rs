@@ -9,7 +9,10 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Error;
 use super::canvas::{Area, FONT, UNITS, failed};
-use super::scale::{LIMIT, Ticks, superscript};
+pub use super::pen::Frame;
+use super::pen::INK;
+use super::scale::LIMIT;
+use super::ticks::{Ticks, superscript};
 
 /// Colours that people with any colour vision tell apart on white (Okabe & Ito 2008, without their yellow, which is too light).
 pub const PALETTE: [RGBColor; 7] = [
@@ -24,9 +27,6 @@ pub const PALETTE: [RGBColor; 7] = [
 
 /// The place of black in the [`PALETTE`].
 pub const BLACK: usize = 4;
-
-/// Letters, frames and ticks.
-pub const INK: RGBColor = RGBColor(30, 30, 30);
 
 /// Lines that guide the eye.
 const GUIDE: RGBColor = RGBColor(225, 225, 225);
@@ -127,19 +127,6 @@ struct Marks {
     labels: Vec<String>,
     /// The power of ten that the labels leave out.
     exponent: i32,
-}
-
-/// A rectangle in pixels of the drawing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
-    /// Distance from the left.
-    pub left: f64,
-    /// Distance from the top.
-    pub top: f64,
-    /// Width.
-    pub width: f64,
-    /// Height.
-    pub height: f64,
 }
 
 /// A frame with its axes.

@@ -6,8 +6,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::Error;
-use super::axes::{Axes, Axis, Frame, INK, Letters, PALETTE, SMALL, dot, line, units, with_unit};
+use super::axes::{Axes, Axis, Frame, Letters, PALETTE, SMALL, dot, line, units, with_unit};
 use super::canvas::{Area, Drawing, failed};
+use super::pen::INK;
 
 /// Width of a chart in pixels.
 pub const WIDTH: u32 = 1600;
