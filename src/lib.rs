@@ -46,6 +46,7 @@
 mod analysis;
 mod angles;
 pub mod cells;
+pub mod compare;
 pub mod contour;
 pub mod moments;
 pub mod picture;
