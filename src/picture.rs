@@ -3,6 +3,7 @@
 //! A picture is made in memory as an [`Image`]; writing it to a file is left to the caller. Where a point of the sphere
 //! goes is decided in [`projection`]; everything here works for any [`Projection`].
 
+pub mod canvas;
 mod image;
 pub mod projection;
 mod scale;
@@ -15,6 +16,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, register_font};
 use rayon::prelude::*;
 
+use canvas::failed;
 pub use image::Image;
 pub use projection::{Mollweide, Projection};
 use scale::{Scale, Ticks, superscript};
@@ -51,6 +53,14 @@ pub enum Error {
     Width {
         /// The width given.
         width: usize,
+    },
+    /// A size that no picture can have.
+    #[error("a picture of {width} × {height} pixels cannot be made")]
+    Size {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
     },
     /// No panel to draw.
     #[error("there is no panel to draw")]
@@ -343,10 +353,6 @@ static FONT_REGISTERED: LazyLock<()> = LazyLock::new(|| {
     let registered = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());
     assert!(registered.is_ok(), "the font that comes with the program is valid");
 });
-
-fn failed<E: std::error::Error + Send + Sync + 'static>(error: E) -> Error {
-    Error::Draw(Box::new(error))
-}
 
 #[cfg(test)]
 mod tests {

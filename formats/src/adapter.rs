@@ -18,7 +18,7 @@ use crate::map::Time;
 use crate::netcdf::Netcdf;
 use crate::ply::SurfacePly;
 use crate::zarr::{self, ZarrStore};
-use crate::{CoordinateSystem, Error, Map, Ordering};
+use crate::{Card, CardValue, CoordinateSystem, Error, Map, Ordering};
 
 /// The field of a file that is to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -186,6 +186,17 @@ pub struct TableDescription {
     pub dimensions: Vec<DimensionDescription>,
     /// The data columns, or the one field of a variable.
     pub fields: Vec<FieldDescription>,
+    /// What the file says of it: the header entries of a FITS table, whose own numbering of columns and sizes is among
+    /// them, or the attributes of a variable's groups, with their names in capitals. Comments are left out.
+    #[serde(skip)]
+    pub cards: Vec<Card>,
+}
+
+impl TableDescription {
+    /// The value of a header entry.
+    pub fn card(&self, key: &str) -> Option<&CardValue> {
+        self.cards.iter().find(|card| card.key == key).map(|card| &card.value)
+    }
 }
 
 /// Where a table or variable is in its file.
