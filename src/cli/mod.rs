@@ -8,6 +8,7 @@ mod demo;
 mod info;
 mod input;
 mod map;
+mod mapping;
 mod measures;
 mod options;
 mod output;
