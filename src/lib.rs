@@ -51,6 +51,7 @@ pub mod contour;
 pub mod moments;
 pub mod picture;
 pub mod simulate;
+pub mod smoothing;
 pub mod statistics;
 pub mod thresholds;
 pub mod totals;

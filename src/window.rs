@@ -7,7 +7,7 @@
 
 mod direct;
 mod prefix;
-mod reach;
+pub(crate) mod reach;
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
