@@ -24,7 +24,7 @@ pub(crate) struct Input {
     select: Vec<At>,
     /// Number of the FITS extension, 0 for the primary one [default: the first with a map].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
-    hdu: Option<usize>,
+    pub(crate) hdu: Option<usize>,
     /// Nside to bring fields on other grids, points, surfaces and multi-order (UNIQ) maps to [default: that closest to
     /// their spacing; that of the finest cells].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]

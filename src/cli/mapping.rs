@@ -82,6 +82,21 @@ impl Mapping {
         Ok(Mapper { mapping: self, measures, mask: self.input.mask()?, analysis: self.analysis() })
     }
 
+    /// The measures asked for, as they were.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.measure.iter().flat_map(|list| split(list))
+    }
+
+    /// Which maps of files are read.
+    pub(crate) fn input(&self) -> &Input {
+        &self.input
+    }
+
+    /// How results are laid out.
+    pub(crate) fn layout(&self) -> &LayoutOptions {
+        &self.layout
+    }
+
     /// The file of the mask.
     pub(crate) fn mask(&self) -> Option<&Path> {
         self.input.mask.as_deref()
@@ -94,7 +109,7 @@ impl Mapping {
             misused(command, format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
         };
         let mut measures: Vec<Arc<dyn Measure>> = Vec::new();
-        for text in self.measure.iter().flat_map(|list| split(list)) {
+        for text in self.names() {
             let measure = catalogue.find(text).map_err(|e| match &e {
                 CatalogueError::Formula(formula) => wrong(text, format!("{e}\n\n{}", formula.marked())),
                 _ => wrong(text, e.to_string()),
@@ -215,7 +230,7 @@ impl Mapper<'_> {
     }
 
     /// The number of Minkowski maps of each measure that a step makes.
-    fn tables(&self) -> usize {
+    pub(crate) fn tables(&self) -> usize {
         let thresholds = if self.mapping.sequence { self.analysis.thresholds.values().len() } else { 1 };
         self.analysis.windows.len() * thresholds
     }

@@ -4,6 +4,7 @@
 //! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
 //! file.
 
+mod compare;
 mod demo;
 mod info;
 mod input;
@@ -36,6 +37,7 @@ Examples:
   longan info sky.fits                   what a file holds
   longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
   longan map sims/*.fits -o maps/        many maps, one output each
+  longan compare sky_evq.fits maps/*.fits -o deviation.fits
   longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
   longan regrid stations.csv -o rainfall.fits --variable rain
@@ -51,6 +53,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Map(map::Arguments),
+    Compare(compare::Arguments),
     Totals(totals::Arguments),
     Info(info::Arguments),
     Regrid(regrid::Arguments),
@@ -66,6 +69,7 @@ pub(crate) fn main() -> ExitCode {
     clean_up_when_stopped();
     let done = match Arguments::parse().command {
         Command::Map(arguments) => map::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Regrid(arguments) => regrid::run(&arguments),

@@ -67,7 +67,7 @@ fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
 }
 
 /// A keyword with a number, within the eight characters of FITS: FORMULA1 to FORMULA9, FORMUL10 and so on.
-fn numbered(keyword: &str, number: usize) -> String {
+pub(crate) fn numbered(keyword: &str, number: usize) -> String {
     let number = number.to_string();
     let room = 8usize.saturating_sub(number.len()).min(keyword.len());
     format!("{}{number}", &keyword[..room])

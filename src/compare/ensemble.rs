@@ -199,15 +199,31 @@ fn largest(sigmas: impl ParallelIterator<Item = f64>) -> Option<f64> {
     Some(sigmas.map(f64::abs).reduce(|| f64::NAN, f64::max)).filter(|x| !x.is_nan())
 }
 
-/// The probability that one of as many maps, all of the same kind, deviates at least as much anywhere as the data does:
-/// its rank among the largest deviations of all, (1 + #{simulations ≥ data})/(1 + #simulations).
-pub fn p_value(data: f64, simulations: impl IntoIterator<Item = Option<f64>>) -> f64 {
-    let (mut all, mut above) = (1, 1);
-    for simulation in simulations {
-        all += 1;
-        above += usize::from(simulation.is_some_and(|largest| largest >= data * (1.0 - EQUAL)));
+/// The place of the data's largest deviation among those of the simulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rank {
+    /// Simulations whose largest deviation is as large as that of the data.
+    pub as_large: usize,
+    /// All simulations.
+    pub simulations: usize,
+}
+
+impl Rank {
+    /// The rank among simulations' largest deviations; one without any has none as large.
+    pub fn new(data: f64, simulations: impl IntoIterator<Item = Option<f64>>) -> Self {
+        let mut rank = Rank { as_large: 0, simulations: 0 };
+        for largest in simulations {
+            rank.simulations += 1;
+            rank.as_large += usize::from(largest.is_some_and(|largest| largest >= data * (1.0 - EQUAL)));
+        }
+        rank
     }
-    above as f64 / all as f64
+
+    /// The probability that one of as many maps, all of the same kind, deviates at least as much anywhere:
+    /// (1 + #{as large})/(1 + #{simulations}).
+    pub fn p_value(&self) -> f64 {
+        (1 + self.as_large) as f64 / (1 + self.simulations) as f64
+    }
 }
 
 #[cfg(test)]
@@ -338,11 +354,11 @@ mod tests {
 
     #[test]
     fn p_values_are_ranks() {
-        let of = |data, simulations: &[f64]| p_value(data, simulations.iter().map(|x| Some(*x)));
+        let of = |data, simulations: &[f64]| Rank::new(data, simulations.iter().map(|x| Some(*x))).p_value();
         assert_eq!(of(3.0, &[1.0, 2.0, 4.0]), 0.5);
         assert_eq!(of(5.0, &[1.0, 2.0, 4.0]), 0.25);
         assert_eq!(of(1.0, &[1.0, 2.0, 4.0]), 1.0);
-        assert_eq!(p_value(1.0, [None, Some(0.5)]), 1.0 / 3.0);
+        assert_eq!(Rank::new(1.0, [None, Some(0.5)]).p_value(), 1.0 / 3.0);
     }
 
     /// Distance of a sample from the uniform distribution on these many equal steps of 0 to 1: Pearson's χ².
@@ -376,7 +392,7 @@ mod tests {
             local.push((found.local_percentile[2] / 100.0 * 9.0 + 0.5) / 10.0);
             global.push(found.global_percentile[2]);
             let simulations = maps[1..].iter().map(|map| ensemble.largest_left_out(map).unwrap());
-            let p = p_value(ensemble.largest().unwrap(), simulations.collect::<Vec<_>>());
+            let p = Rank::new(ensemble.largest().unwrap(), simulations).p_value();
             p_values.push(p - 0.05);
         }
         assert!(chi_square(&local, 10) < CHI_SQUARE_9, "{}", chi_square(&local, 10));
