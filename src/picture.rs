@@ -3,7 +3,9 @@
 //! A picture is made in memory as an [`Image`]; writing it to a file is left to the caller. Where a point of the sphere
 //! goes is decided in [`projection`]; everything here works for any [`Projection`].
 
+pub mod axes;
 pub mod canvas;
+pub mod chart;
 mod image;
 pub mod projection;
 mod scale;

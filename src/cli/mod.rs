@@ -6,6 +6,7 @@
 
 mod compare;
 mod demo;
+mod graph;
 mod info;
 mod input;
 mod map;
@@ -40,6 +41,7 @@ Examples:
   longan compare sky_evq.fits maps/*.fits -o deviation.fits
   longan map era5.nc -o evq.nc --variable z --select level=500
   longan totals sky.fits                 area, length and Euler characteristic
+  longan graph sky.fits -o graph.png     the same against threshold, drawn
   longan regrid stations.csv -o rainfall.fits --variable rain
   longan plugin new beta                 a crate in Rust for a measure of one's own
 
@@ -55,6 +57,7 @@ enum Command {
     Map(map::Arguments),
     Compare(compare::Arguments),
     Totals(totals::Arguments),
+    Graph(graph::Arguments),
     Info(info::Arguments),
     Regrid(regrid::Arguments),
     Measures(measures::Arguments),
@@ -71,6 +74,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Map(arguments) => map::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),

@@ -70,7 +70,7 @@ pub(super) struct Ticks {
 
 impl Ticks {
     /// At most `most` multiples of 1, 2 or 5 times a power of ten, within the range.
-    fn new(low: f64, high: f64, most: usize) -> Self {
+    pub(super) fn new(low: f64, high: f64, most: usize) -> Self {
         let largest = low.abs().max(high.abs()).log10().floor() as i32;
         let exponent = if (-3..5).contains(&largest) { 0 } else { largest };
         let power = |n: i32| 10f64.powi(n.max(-307));
