@@ -6,6 +6,7 @@
 pub mod axes;
 pub mod canvas;
 pub mod chart;
+pub mod cloud;
 mod image;
 pub mod projection;
 mod scale;

@@ -1,12 +1,13 @@
 //! Two measures at one pixel, in the data and all simulations: a table and a picture.
 //!
-//! What is drawn into the axes is decided here, how axes look in [`longan::picture`].
+//! How the picture looks is left to [`longan::picture::cloud`].
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use longan::formats::{self, Error, Healpix};
+use longan::picture::cloud::{Cloud, Quantity};
 
 use super::super::options::{between, shown};
 use super::said::Column;
@@ -86,8 +87,16 @@ impl Scatter {
         overwrite: bool,
     ) -> anyhow::Result<Vec<String>> {
         let table = table(files, points, columns).context("the table of the scatter plot")?;
+        let [x, y] = columns.map(|column| Quantity { name: column.name.clone(), unit: column.unit.clone() });
+        let mut points: Vec<(f64, f64)> = points.iter().map(|[x, y]| (*x, *y)).collect();
+        let star = points.remove(0);
+        let legend = [format!("{} simulations", points.len()), files[0].to_string_lossy().into_owned()];
+        let drawing = Cloud { x, y, points, star, legend }.draw().with_context(|| shown(&self.picture))?;
+        let svg = self.picture.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
+        let picture = if svg { drawing.svg().as_bytes().to_vec() } else { drawing.png().context("the picture")? };
         save(&self.table, overwrite, &table)?;
-        Ok(vec![shown(&self.table)])
+        save(&self.picture, overwrite, &picture)?;
+        Ok(self.outputs().map(shown).to_vec())
     }
 }
 
