@@ -7,6 +7,7 @@
 mod demo;
 mod info;
 mod input;
+mod jobs;
 mod map;
 mod mapping;
 mod measures;
