@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use crate::columns::{self, Column, shown};
 use crate::directions::{self, FARTHEST, at, from_centre};
 use crate::points::Samples;
-use crate::{Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Selection, Time, UNSEEN, is_bad};
+use crate::{Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Room, Selection, Time, UNSEEN, is_bad};
 
 /// What may part cells.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
@@ -84,6 +84,11 @@ struct One {
 impl Maps for One {
     fn times(&self) -> &[Time] {
         &[]
+    }
+
+    fn room(&self) -> Option<Room> {
+        // Direction and value, and the directions once more in a tree.
+        Room::of_points(self.nside, self.samples.values.len(), 128)
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {

@@ -17,6 +17,7 @@ use longan::compare::{Ensemble, Rank, peaks};
 use longan::formats::{self, Card, Error, Healpix};
 use longan::smoothing::Smoothing;
 
+use super::jobs::Jobs;
 use super::mapping::Mapping;
 use super::misused;
 use super::options::{Format, Running, between, check_memory, print, shown, whole};
@@ -94,6 +95,8 @@ pub(crate) struct Arguments {
     #[arg(long, help_heading = "Output")]
     overwrite: bool,
     #[command(flatten)]
+    jobs: Jobs,
+    #[command(flatten)]
     running: Running,
 }
 
@@ -126,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let files = match &arguments.work {
         Some(folder) => {
             let inputs: Vec<&Path> = arguments.inputs().collect();
-            work::minkowski_maps(folder, &inputs, &arguments.mapping, &arguments.running)?
+            work::minkowski_maps(folder, &inputs, &arguments.mapping, &arguments.jobs, &arguments.running)?
         }
         None => arguments.said()?,
     };

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
-use longan::formats::{self, At, Error, Field, Gather, Healpix, Map, Maps, Method, Place, Regrid, Selection};
+use longan::formats::{self, At, Error, Field, Gather, Healpix, Map, Maps, Method, Place, Regrid, Room, Selection};
 
 use super::options::{between, finite, nside, whole};
 
 /// Which map of a file, how it comes to HEALPix, and which pixels of it.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct Input {
     /// Variable or column: its name, or its number counted from 0 as healpy does [default: the first of a FITS table; of
@@ -49,7 +49,7 @@ pub(crate) struct Input {
 }
 
 /// How what is not HEALPix comes to be.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Other grids, points and surfaces")]
 struct RegridOptions {
     /// Latitude-longitude grids: the mean over each pixel (exact overlaps), between the four grid points about its
@@ -77,7 +77,7 @@ struct RegridOptions {
     allow_folds: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum MethodOption {
     Conservative,
     Bilinear,
@@ -130,6 +130,11 @@ impl Series {
     /// How many they are.
     pub(crate) fn steps(&self) -> usize {
         self.maps.times().len().max(1)
+    }
+
+    /// What they take, where that shows before one is read.
+    pub(crate) fn room(&self) -> Option<Room> {
+        self.maps.room()
     }
 
     /// One of them, masked.

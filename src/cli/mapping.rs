@@ -3,27 +3,28 @@
 //! Which files there are, and what becomes of a failure, is left to the commands.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use longan::formats::{Error, Healpix, Map};
+use longan::formats::{Error, Healpix, Map, Room};
 use longan::measures::{CatalogueError, Measure, split};
 use longan::statistics::{Statistics, statistics};
 use longan::window::{Summation, Ways};
 use longan::{Analysis, AnalysisError, MinkowskiMaps, Weight};
 
 use super::input::{self, Input, Mask};
+use super::jobs::Memory;
 use super::misused;
-use super::options::{BodyOptions, between, check_memory, decimals, nside, shown};
+use super::options::{BodyOptions, between, check_memory, decimals, is_same_file, nside, shown};
 use super::output::Provenance;
 use super::plugin::Plugins;
 use super::sink::{self, Kind, LayoutOptions};
 
 /// What of a file is measured, how, and in which layout the result is written.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 pub(crate) struct Mapping {
     /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
     /// "beta = (w1 - psi2)/(w1 + psi2)"; may be repeated. `longan measures` lists all measures, and
@@ -67,10 +68,13 @@ pub(crate) struct Mapping {
     layout: LayoutOptions,
 }
 
+/// The measure where none is asked for.
+const DEFAULT: &str = "evq";
+
 /// Columns that a FITS table can have.
 const COLUMNS_MAX: usize = 999;
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum WeightOption {
     Length,
     Curvature,
@@ -78,8 +82,26 @@ enum WeightOption {
 
 impl Mapping {
     /// What maps files, once it is clear that the mask can be read.
-    pub(crate) fn mapper(&self, measures: Vec<Arc<dyn Measure>>) -> anyhow::Result<Mapper<'_>> {
-        Ok(Mapper { mapping: self, measures, mask: self.input.mask()?, analysis: self.analysis() })
+    pub(crate) fn mapper(&self, measures: Vec<Arc<dyn Measure>>, memory: Memory) -> anyhow::Result<Mapper<'_>> {
+        Ok(Mapper { mapping: self, measures, mask: self.input.mask()?, analysis: self.analysis(), memory })
+    }
+
+    /// Whether these options ask for the same as others, in whatever way they are given.
+    pub(crate) fn is_same(&self, other: &Mapping) -> bool {
+        let [one, other] = [self, other].map(|mapping| {
+            let mut mapping = mapping.clone();
+            mapping.measure = mapping.measure.iter().flat_map(|list| split(list)).map(str::to_owned).collect();
+            if mapping.measure.is_empty() {
+                mapping.measure.push(DEFAULT.to_owned());
+            }
+            let masks: Vec<PathBuf> = mapping.input.mask.take().into_iter().collect();
+            let plugins = std::mem::take(&mut mapping.plugins.plugin);
+            (mapping, masks, plugins)
+        });
+        let same = |these: &[PathBuf], those: &[PathBuf]| {
+            these.len() == those.len() && std::iter::zip(these, those).all(|(this, that)| is_same_file(this, that))
+        };
+        one.0 == other.0 && same(&one.1, &other.1) && same(&one.2, &other.2)
     }
 
     /// The measures asked for, as they were.
@@ -127,7 +149,7 @@ impl Mapping {
             return Err(misused(command, problem));
         }
         if measures.is_empty() {
-            measures.push(catalogue.find("longan:evq")?);
+            measures.push(catalogue.find(&format!("longan:{DEFAULT}"))?);
         }
         Ok(measures)
     }
@@ -154,6 +176,7 @@ pub(crate) struct Mapper<'a> {
     measures: Vec<Arc<dyn Measure>>,
     mask: Option<Mask>,
     analysis: Analysis,
+    memory: Memory,
 }
 
 /// What is made of one file.
@@ -177,8 +200,9 @@ impl Mapper<'_> {
         progress: impl Fn(f64),
     ) -> anyhow::Result<Made> {
         let start = Instant::now();
-        let Mapper { mapping, measures, mask, analysis } = self;
+        let Mapper { mapping, measures, mask, analysis, memory } = self;
         let mut series = mapping.input.open(path)?;
+        let _taken = memory.take(series.room().and_then(|room| self.bytes(room))).with_context(|| shown(path))?;
         let steps = series.steps();
         let map = series.read(0, mask.as_ref())?;
         let about = || shown(path);
@@ -227,6 +251,15 @@ impl Mapper<'_> {
         let all = format!("{of}{} of Nside {}", measures[0].column(), grid.nside());
         let seconds = start.elapsed().as_secs_f64();
         Ok(Made { summary: format!("{all} {summary} ({seconds:.2} s)"), ways, warning })
+    }
+
+    /// About how many bytes it takes to map a file, where that shows before it is read.
+    fn bytes(&self, room: Room) -> Option<usize> {
+        let grid = Healpix::new(room.nside).ok()?;
+        let mask = if self.mask.is_some() { grid.pixels() * size_of::<f64>() } else { 0 };
+        // Where there is an error, mapping says so.
+        let maps = self.analysis.memory(grid, &self.measures, self.mapping.sequence).ok()?;
+        Some(room.bytes.saturating_add(mask).saturating_add(maps))
     }
 
     /// The number of Minkowski maps of each measure that a step makes.

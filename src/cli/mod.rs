@@ -9,6 +9,7 @@ mod demo;
 mod graph;
 mod info;
 mod input;
+mod jobs;
 mod map;
 mod mapping;
 mod measures;

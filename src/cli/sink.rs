@@ -15,7 +15,7 @@ use super::options::shown;
 use super::output::text;
 
 /// How maps are laid out in files.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct LayoutOptions {
     /// Ordering of the output [default: the input's].
@@ -26,7 +26,7 @@ pub(crate) struct LayoutOptions {
     float32: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum OrderingOption {
     Ring,
     #[value(alias = "nest")]

@@ -376,7 +376,7 @@ fn aligned_structures_are_found_where_they_are_planted() {
         (found, rank.p_value())
     };
     // Stripes along the meridians within some 15 degrees of (120, 20).
-    let (lon, lat) = (120.0, 20.0);
+    let (lon, lat) = (120f64, 20f64);
     let stripes = |l: f64, b: f64| {
         let east = (l - lon) * lat.to_radians().cos();
         let distance = east.hypot(b - lat);

@@ -10,7 +10,9 @@ use super::grid::{Grid, Scheme};
 use crate::canvas::{CHUNK, Canvas};
 use crate::dataset::{Array, Dataset, Variable};
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
-use crate::{Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Selection, Time, UNSEEN, cf, is_bad};
+use crate::{
+    Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Room, Selection, Time, UNSEEN, cf, is_bad,
+};
 
 /// Finds what is selected of a field.
 pub(super) fn open(dataset: &Rc<dyn Dataset>, variable: usize, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
@@ -63,6 +65,15 @@ struct Field {
 impl Maps for Field {
     fn times(&self) -> &[Time] {
         self.chosen.times()
+    }
+
+    fn room(&self) -> Option<Room> {
+        let (grid, cells) = match &self.cells {
+            Cells::All(grid, _) => (*grid, grid.pixels()),
+            Cells::Some(grid, _, places) => (*grid, 2 * places.len()),
+            Cells::Sizes(places, _) => (Healpix::new(self.nside?).ok()?, 4 * places.len()),
+        };
+        Some(Room::of(grid, size_of::<f64>() * cells))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use longan::formats::{self, Error};
 
+use super::super::jobs::Jobs;
 use super::super::mapping::Mapping;
 use super::super::misused;
 use super::super::options::{Running, shown};
@@ -25,9 +26,10 @@ pub(super) fn minkowski_maps(
     folder: &Path,
     inputs: &[&Path],
     mapping: &Mapping,
+    jobs: &Jobs,
     running: &Running,
 ) -> anyhow::Result<Vec<Said>> {
-    let mapper = mapping.mapper(mapping.measures("compare")?)?;
+    let mapper = mapping.mapper(mapping.measures("compare")?, jobs.memory())?;
     if mapper.tables() != 1 {
         let problem = "one window and no --sequence is compared; use `longan map`, and compare with --hdu";
         return Err(misused("compare", problem.to_owned()));
@@ -46,20 +48,21 @@ pub(super) fn minkowski_maps(
     }
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot make this folder", shown(folder)))?;
     record(folder, mapping, &outputs)?;
-    let jobs = jobs(inputs, &outputs)?;
-    if !jobs.is_empty() {
-        let done = outputs.len() - jobs.len();
-        let progress = Progress::new(format!("Minkowski maps in {}", shown(folder)), running.quiet);
-        let all: Vec<PathBuf> = inputs.iter().map(|input| input.to_path_buf()).collect();
-        for (i, (input, output)) in jobs.iter().enumerate() {
-            let command = command(&all, input);
-            let told = |share| progress.set((done as f64 + i as f64 + share) / outputs.len() as f64);
-            let made = mapper.map(input, output, true, &command, told)?;
-            if let Some(warning) = made.warning {
-                running.warn(warning);
-            }
+    let tasks = tasks(inputs, &outputs)?;
+    let all: Vec<PathBuf> = inputs.iter().map(|input| input.to_path_buf()).collect();
+    let progress = Progress::of_parts(tasks.len(), running.quiet || tasks.is_empty());
+    let made = jobs.run(&tasks, |(input, output)| {
+        let part = progress.part();
+        let made = mapper.map(input, output, true, &command(&all, input), |share| part.set(share))?;
+        drop(part);
+        if let Some(warning) = made.warning {
+            progress.aside(|| running.warn(warning));
         }
-    }
+        anyhow::Ok(())
+    });
+    drop(progress);
+    // The others are done, and are not done again when this one can be.
+    made.into_iter().collect::<anyhow::Result<()>>()?;
     let said = |output: &PathBuf| {
         Said::of(output, None)?
             .with_context(|| format!("{}: this is no Minkowski map of longan; remove it", shown(output)))
@@ -125,8 +128,8 @@ fn record(folder: &Path, mapping: &Mapping, outputs: &[PathBuf]) -> anyhow::Resu
 }
 
 /// The Minkowski maps that are still to be made: those that do not exist, or whose input has changed since.
-fn jobs<'a>(inputs: &[&'a Path], outputs: &'a [PathBuf]) -> anyhow::Result<Vec<(&'a Path, &'a Path)>> {
-    let mut jobs: Vec<(&Path, &Path)> = Vec::new();
+fn tasks<'a>(inputs: &[&'a Path], outputs: &'a [PathBuf]) -> anyhow::Result<Vec<(&'a Path, &'a Path)>> {
+    let mut tasks: Vec<(&Path, &Path)> = Vec::new();
     for (input, output) in inputs.iter().zip(outputs) {
         let changed = |path: &Path| path.metadata().and_then(|metadata| metadata.modified());
         if output.exists() {
@@ -143,9 +146,9 @@ fn jobs<'a>(inputs: &[&'a Path], outputs: &'a [PathBuf]) -> anyhow::Result<Vec<(
                 continue;
             }
         }
-        if !jobs.iter().any(|(_, other)| other == output) {
-            jobs.push((*input, output));
+        if !tasks.iter().any(|(_, other)| other == output) {
+            tasks.push((*input, output));
         }
     }
-    Ok(jobs)
+    Ok(tasks)
 }
