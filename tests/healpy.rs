@@ -213,7 +213,7 @@ rng = np.random.default_rng(1)
 nside, lmax = 64, 24
 alm = rng.normal(size=hp.Alm.getsize(lmax)) + 1j * rng.normal(size=hp.Alm.getsize(lmax))
 alm[:lmax + 1] = alm[:lmax + 1].real
-smooth = lambda fwhm: hp.alm2map(hp.smoothalm(alm, fwhm=np.radians(fwhm)), nside, lmax=lmax)
+smooth = lambda fwhm: hp.alm2map(hp.smoothalm(alm, fwhm=np.radians(fwhm), inplace=False), nside, lmax=lmax)
 np.array([hp.alm2map(alm, nside, lmax=lmax), smooth(5), smooth(12), smooth(40)]).tofile('maps.raw')
 # The harmonics of the map are those it was made of, so that this is healpy's smoothing.
 again = hp.smoothing(hp.alm2map(alm, nside, lmax=lmax), fwhm=np.radians(12), lmax=lmax, iter=20)

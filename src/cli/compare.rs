@@ -10,11 +10,13 @@ mod work;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use longan::compare::{Ensemble, Rank, peaks};
 use longan::formats::{self, Card, Error, Healpix};
+use longan::measures::Measure;
 use longan::smoothing::Smoothing;
 
 use super::jobs::Jobs;
@@ -129,7 +131,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let files = match &arguments.work {
         Some(folder) => {
             let inputs: Vec<&Path> = arguments.inputs().collect();
-            work::minkowski_maps(folder, &inputs, &arguments.mapping, &arguments.jobs, &arguments.running)?
+            let measures = arguments.mapping.measures("compare")?;
+            let column =
+                |measure: &Arc<dyn Measure>| Column { name: measure.column(), unit: measure.unit().to_owned() };
+            let columns: Vec<Column> = measures.iter().map(column).collect();
+            columns.iter().try_for_each(Column::check)?;
+            scatter.as_ref().map(|scatter| scatter.pair(&columns)).transpose()?;
+            work::minkowski_maps(folder, &inputs, &arguments.mapping, measures, &arguments.jobs, &arguments.running)?
         }
         None => arguments.said()?,
     };
@@ -147,6 +155,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             data.input_nside,
             shown(&other.path),
             other.input_nside
+        ));
+    }
+
+    if data.others > 0 {
+        arguments.running.warn(format_args!(
+            "{}: this has {} other extensions of Minkowski maps; --hdu chooses another one",
+            shown(&data.path),
+            data.others
         ));
     }
 
@@ -302,9 +318,7 @@ impl Arguments {
                 bail!("{}: there is no measure '{name}'; there are {}", shown(&file.path), file.listed());
             }
             let column = data.columns.iter().find(|column| column.is_called(name)).context("a column")?;
-            if column.is_direction() {
-                bail!("{} is an angle, of which there is no mean or order; compare other measures", column.name);
-            }
+            column.check()?;
             if !columns.contains(column) {
                 columns.push(column.clone());
             }

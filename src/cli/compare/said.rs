@@ -28,6 +28,8 @@ pub(super) struct Said {
     facts: Vec<(&'static str, String)>,
     /// The thresholds in the unit in which they were given, and that unit.
     thresholds: (Vec<f64>, String),
+    /// The number of other extensions that hold Minkowski maps, where none was asked for.
+    pub(super) others: usize,
     /// Nside of the map that was measured.
     pub(super) input_nside: String,
     /// Entries that the comparison's header repeats.
@@ -45,6 +47,16 @@ impl Column {
     /// Whether it holds angles, which have neither a mean nor an order.
     pub(super) fn is_direction(&self) -> bool {
         self.unit == "deg" || self.name.to_ascii_uppercase().contains("DIRECTION")
+    }
+
+    /// Refuses what cannot be compared.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        ensure!(
+            !self.is_direction(),
+            "{} is an angle, of which there is no mean or order; compare other measures",
+            self.name
+        );
+        Ok(())
     }
 
     /// Whether a name is its, in any case and with hyphens as in names of measures.
@@ -65,9 +77,12 @@ impl Said {
             _ => true,
         };
         let Some(first) = tables.iter().filter(is_asked_for).find(|table| is_minkowski(table)) else { return Ok(None) };
-        let (hdu, tables) = match first.place {
-            TablePlace::Hdu { hdu, .. } => (Some(hdu), vec![first]),
-            _ => (None, tables.iter().filter(|table| is_minkowski(table)).collect()),
+        let all: Vec<&TableDescription> = tables.iter().filter(|table| is_minkowski(table)).collect();
+        let (others, hdu, tables) = match first.place {
+            TablePlace::Hdu { hdu: this, .. } => {
+                (if hdu.is_none() { all.len() - 1 } else { 0 }, Some(this), vec![first])
+            }
+            _ => (0, None, all),
         };
         let (mut columns, mut nsides) = (Vec::new(), Vec::new());
         for table in tables {
@@ -91,18 +106,18 @@ impl Said {
             }));
         }
         let nside = *nsides.first().context("a Minkowski map on a grid")?;
-        Ok(Some(Self::of_table(path, hdu, first, nside, columns)))
+        Ok(Some(Said { others, hdu, ..Self::of_table(path, first, nside, columns) }))
     }
 
-    fn of_table(path: &Path, hdu: Option<usize>, table: &TableDescription, nside: usize, columns: Vec<Column>) -> Self {
+    fn of_table(path: &Path, table: &TableDescription, nside: usize, columns: Vec<Column>) -> Self {
         let word = |key: &str| table.card(key).map(words).unwrap_or_default();
         let window = word("WINDOW");
         let formulas: Vec<String> =
             table.cards.iter().filter(|card| card.key.starts_with("FORMUL")).map(|card| words(&card.value)).collect();
         let mut facts = vec![
             ("Nside", nside.to_string()),
-            ("a window in degrees", window.clone()),
-            ("the body's side of thresholds", word("BODY")),
+            ("a window of", format!("{window} degrees")),
+            ("the body's side", word("BODY")),
             ("the weight", word("WEIGHT")),
             ("the unit of thresholds", word("THRUNIT")),
             ("the number of thresholds", word("NTHRESH")),
@@ -124,7 +139,8 @@ impl Said {
         let repeat = |key: &'static str| Some((key, table.card(key)?.clone()));
         Said {
             path: path.to_owned(),
-            hdu,
+            hdu: None,
+            others: 0,
             nside,
             columns,
             windows: window.split(',').filter_map(|window| window.trim().parse().ok()).collect(),
@@ -146,7 +162,7 @@ impl Said {
         let differ = |what: &str, mine: &str, others: &str| {
             let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
             format!(
-                "{} has {what} {}, but {} has {}; compare maps that were made in the same way",
+                "{} has {what} {}, but {} has {what} {}; compare maps that were made in the same way",
                 shown(&self.path),
                 or_none(mine),
                 shown(&other.path),

@@ -5,14 +5,16 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, bail, ensure};
 use longan::formats::{self, Error};
+use longan::measures::Measure;
 
 use super::super::jobs::Jobs;
 use super::super::mapping::Mapping;
 use super::super::misused;
-use super::super::options::{Running, shown};
+use super::super::options::{Running, is_same_file, shown};
 use super::super::output::command;
 use super::super::progress::Progress;
 use super::super::sink::Kind;
@@ -26,10 +28,11 @@ pub(super) fn minkowski_maps(
     folder: &Path,
     inputs: &[&Path],
     mapping: &Mapping,
+    measures: Vec<Arc<dyn Measure>>,
     jobs: &Jobs,
     running: &Running,
 ) -> anyhow::Result<Vec<Said>> {
-    let mapper = mapping.mapper(mapping.measures("compare")?, jobs.memory())?;
+    let mapper = mapping.mapper(measures, jobs.memory())?;
     if mapper.tables() != 1 {
         let problem = "one window and no --sequence is compared; use `longan map`, and compare with --hdu";
         return Err(misused("compare", problem.to_owned()));
@@ -48,7 +51,7 @@ pub(super) fn minkowski_maps(
     }
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot make this folder", shown(folder)))?;
     record(folder, mapping, &outputs)?;
-    let tasks = tasks(inputs, &outputs)?;
+    let tasks = tasks(inputs, &outputs, mapping.mask())?;
     let all: Vec<PathBuf> = inputs.iter().map(|input| input.to_path_buf()).collect();
     let progress = Progress::of_parts(tasks.len(), running.quiet || tasks.is_empty());
     let made = jobs.run(&tasks, |(input, output)| {
@@ -77,8 +80,7 @@ fn outputs(folder: &Path, inputs: &[&Path]) -> anyhow::Result<Vec<PathBuf>> {
     for input in inputs {
         ensure!(input.file_name().is_some(), "{}: this is not a file; name files", shown(input));
         let output = folder.join(Kind::name_for(input));
-        let same = |other: &Path| other == *input || other.canonicalize().ok() == input.canonicalize().ok();
-        if let Some(other) = names.insert(output.clone(), input).filter(|other| !same(other)) {
+        if let Some(other) = names.insert(output.clone(), input).filter(|other| !is_same_file(other, input)) {
             bail!(
                 "the Minkowski maps of {} and {} would both be {}; give them different names",
                 shown(other),
@@ -127,22 +129,27 @@ fn record(folder: &Path, mapping: &Mapping, outputs: &[PathBuf]) -> anyhow::Resu
     Ok(())
 }
 
-/// The Minkowski maps that are still to be made: those that do not exist, or whose input has changed since.
-fn tasks<'a>(inputs: &[&'a Path], outputs: &'a [PathBuf]) -> anyhow::Result<Vec<(&'a Path, &'a Path)>> {
+/// The Minkowski maps that are still to be made: those that do not exist, or whose input or mask has changed since.
+fn tasks<'a>(
+    inputs: &[&'a Path],
+    outputs: &'a [PathBuf],
+    mask: Option<&Path>,
+) -> anyhow::Result<Vec<(&'a Path, &'a Path)>> {
     let mut tasks: Vec<(&Path, &Path)> = Vec::new();
     for (input, output) in inputs.iter().zip(outputs) {
-        let changed = |path: &Path| path.metadata().and_then(|metadata| metadata.modified());
         if output.exists() {
             let from = made_of(output)?.unwrap_or_default();
-            let same =
-                from == input.to_string_lossy() || Path::new(&from).canonicalize().ok() == input.canonicalize().ok();
             ensure!(
-                same,
+                is_same_file(Path::new(&from), input),
                 "{}: it is made of {from}, not of {}; choose another folder for --work",
                 shown(output),
                 shown(input)
             );
-            if matches!((changed(input), changed(output)), (Ok(input), Ok(output)) if input <= output) {
+            let changed = |path: &Path| path.metadata().and_then(|metadata| metadata.modified()).ok();
+            let since = |path: &Path| {
+                changed(path).is_none_or(|changed_at| changed(output).is_none_or(|made| changed_at > made))
+            };
+            if !std::iter::once(*input).chain(mask).any(since) {
                 continue;
             }
         }
