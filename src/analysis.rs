@@ -9,12 +9,12 @@ use longan_formats::{Healpix, Map};
 use longan_measures::{Measure, MeasureError, Window};
 
 use crate::contour::{Body, Field};
-use crate::moments::{Selection, Weight};
+use crate::moments::{Layout, Selection, Weight};
 use crate::region::Region;
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
 use crate::totals::{Regional, Totals, totals, totals_within};
-use crate::window::{Moments, MovingWindows, Summation, Ways, Windows};
+use crate::window::{self, Moments, MovingWindows, Summation, Ways, Windows};
 
 /// What thresholds are counted in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -210,6 +210,27 @@ impl Analysis {
             return Err(AnalysisError::PixelWindow { map: map.nside(), output: nside });
         }
         Ok(output)
+    }
+
+    /// About how many bytes the Minkowski maps of a field take at most while they are made, beside the field itself.
+    ///
+    /// # Errors
+    /// See [`check`](Self::check), and where measures need another weight.
+    pub fn memory(
+        &self,
+        map: Healpix,
+        measures: &[impl AsRef<dyn Measure>],
+        sequence: bool,
+    ) -> Result<usize, AnalysisError> {
+        let output = self.check(map)?;
+        let thresholds = self.thresholds.values().len();
+        let selection = Selection { by_threshold: sequence, ..self.selection(measures)? };
+        let rows = Layout::new(&selection, thresholds, true).rows;
+        let tables = if sequence { thresholds } else { 1 };
+        let windows = self.windows.iter().map(|degrees| window::memory(map, output, degrees.to_radians(), rows));
+        let columns = tables * self.windows.len() * measures.len() * size_of::<f64>();
+        let maps = output.pixels().saturating_mul(columns);
+        Ok(windows.fold(maps.saturating_add(window::band_memory(map, rows)), usize::saturating_add))
     }
 
     /// The thresholds in the map's unit, and the statistics of the map that they may be counted from.

@@ -46,12 +46,14 @@
 mod analysis;
 mod angles;
 pub mod cells;
+pub mod compare;
 pub mod contour;
 pub mod gaussian;
 pub mod moments;
 pub mod picture;
 pub mod region;
 pub mod simulate;
+pub mod smoothing;
 pub mod statistics;
 pub mod thresholds;
 pub mod totals;

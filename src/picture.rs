@@ -7,6 +7,7 @@
 pub mod axes;
 pub mod canvas;
 pub mod chart;
+pub mod cloud;
 mod coastlines;
 mod colour_bar;
 mod colours;

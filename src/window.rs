@@ -7,10 +7,11 @@
 
 mod direct;
 mod prefix;
-mod reach;
+pub(crate) mod reach;
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
 use longan_formats::{Healpix, Ring};
@@ -173,6 +174,21 @@ impl MovingWindows<'_> {
         }
         Ok(sweeps.into_iter().map(|sweep| sweep.windows).collect())
     }
+}
+
+/// About how many bytes the sums of one radius's windows take at most: those of the output rings that an input ring, a
+/// band of them and a group's rings beside it reach.
+pub(crate) fn memory(input: Healpix, output: Healpix, radius: f64, rows: usize) -> usize {
+    let band = BAND as f64 * PI / input.rings() as f64;
+    let group = (GROUP as f64 * PI / output.rings() as f64).min(radius);
+    // The widest zone is about the equator.
+    let share = (radius + group + band / 2.0).min(FRAC_PI_2).sin();
+    (share * output.pixels() as f64) as usize * (rows + 1) * size_of::<f64>()
+}
+
+/// About how many bytes the moments of a band of input rings take.
+pub(crate) fn band_memory(input: Healpix, rows: usize) -> usize {
+    BAND.min(input.rings()) * 4 * input.nside() * rows * size_of::<f64>()
 }
 
 /// The windows of one radius on their way over the field.

@@ -10,6 +10,8 @@ mod bytes;
 #[allow(dead_code)]
 mod compile;
 
+/// Data against simulations.
+mod compare;
 /// Every family of files, from end to end.
 mod families;
 /// Measures as formulas.

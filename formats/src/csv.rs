@@ -12,7 +12,7 @@ use crate::columns::{self, Column, shown};
 use crate::directions::{self, FARTHEST, at, from_centre};
 use crate::points::Samples;
 use crate::{
-    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Selection, Sphere, Time, UNSEEN, is_bad,
+    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad,
 };
 
 /// What may part cells.
@@ -86,6 +86,11 @@ struct One {
 impl Maps for One {
     fn times(&self) -> &[Time] {
         &[]
+    }
+
+    fn room(&self) -> Option<Room> {
+        // Direction and value, and the directions once more in a tree.
+        Room::of_points(self.nside, self.samples.values.len(), 128)
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {

@@ -8,8 +8,8 @@ use std::rc::Rc;
 use crate::cf::{self, Horizontal};
 use crate::dataset::{Dataset, Kind, Variable};
 use crate::{
-    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Selection, Sphere, TableDescription,
-    Time, Weights,
+    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Room, Selection, Sphere,
+    TableDescription, Time, Weights,
 };
 
 /// Lists name at most this many variables.
@@ -69,6 +69,17 @@ struct Series {
 impl Maps for Series {
     fn times(&self) -> &[Time] {
         self.chosen.times()
+    }
+
+    fn room(&self) -> Option<Room> {
+        let (values, pixels) = (self.from.values(), self.to.pixels());
+        // Weights grow with half their room empty.
+        let weights = 2 * match self.selection.regrid.method {
+            Method::Conservative => values + 4 * pixels,
+            Method::Bilinear => 4 * pixels,
+            Method::Nearest => pixels,
+        };
+        Some(Room::of(self.to, 2 * size_of::<f64>() * values + 8 * pixels + 12 * weights))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {

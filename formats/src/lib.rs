@@ -33,7 +33,8 @@ mod zarr_zstd;
 
 pub use adapter::{
     Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
-    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, is_store, open, read,
+    Indexing, Maps, Method, Place, Regrid, Room, Selection, TableDescription, TablePlace, describe, is_store, open,
+    read,
 };
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
@@ -41,4 +42,4 @@ pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixL
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Sphere, Time, UNSEEN, is_bad};
 pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
 pub use regrid::{LatLon, Weights};
-pub use save::{abandon, check_writable, save};
+pub use save::{abandon, check_writable, save, tidy};

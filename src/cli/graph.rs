@@ -189,7 +189,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let plan = arguments.plan()?;
     let outputs = arguments.outputs()?;
-    let mut mask = arguments.input.mask()?;
+    let mask = arguments.input.mask()?;
     let (curves, simulations) = (arguments.maps_in(&arguments.inputs)?, arguments.maps_in(&arguments.ensemble)?);
     let all = curves + simulations;
     ensure!(
@@ -216,7 +216,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             let mut series = arguments.input.open(path)?;
             for step in 0..series.steps() {
                 let told = |share: f64| progress.set((done as f64 + share) / all as f64);
-                if let Some(curves) = arguments.one(&plan, path, &mut series, step, mask.as_mut(), told)? {
+                if let Some(curves) = arguments.one(&plan, path, &mut series, step, mask.as_ref(), told)? {
                     keep(curves);
                 }
                 done += 1;
@@ -343,7 +343,7 @@ impl Arguments {
         path: &Path,
         series: &mut Series,
         step: usize,
-        mask: Option<&mut Mask>,
+        mask: Option<&Mask>,
         told: impl FnMut(f64),
     ) -> anyhow::Result<Option<Curves>> {
         let map = series.read(step, mask)?;

@@ -156,8 +156,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let projection = arguments.projection()?;
     let kind = Kind::of(output)?;
     formats::check_writable(output, arguments.overwrite)?;
-    let mut mask = arguments.input.mask()?;
-    let map = arguments.read(&arguments.input, path, mask.as_mut())?;
+    let mask = arguments.input.mask()?;
+    let map = arguments.read(&arguments.input, path, mask.as_ref())?;
     if map.values().iter().all(|v| v.is_nan()) {
         running.warn(format_args!("{}: every pixel is masked, so the picture is grey", shown(path)));
     }
@@ -171,7 +171,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let overlays = Overlays {
         coastlines,
         lines: arguments.contours(&map)?,
-        rods: arguments.rods(path, mask.as_mut())?,
+        rods: arguments.rods(path, mask.as_ref())?,
         circles: arguments.circle.clone(),
         marks: arguments.mark.clone(),
     };
@@ -225,7 +225,7 @@ impl Arguments {
     }
 
     /// The map of a file; the first of several times, and says so.
-    fn read(&self, input: &Input, path: &Path, mask: Option<&mut Mask>) -> anyhow::Result<Map> {
+    fn read(&self, input: &Input, path: &Path, mask: Option<&Mask>) -> anyhow::Result<Map> {
         let mut series = input.open(path)?;
         let steps = series.steps();
         let map = series.read(0, mask)?;
@@ -253,7 +253,7 @@ impl Arguments {
     }
 
     /// The directions asked for.
-    fn rods(&self, path: &Path, mask: Option<&mut Mask>) -> anyhow::Result<Option<Rods>> {
+    fn rods(&self, path: &Path, mask: Option<&Mask>) -> anyhow::Result<Option<Rods>> {
         if self.rods.is_none() {
             return Ok(None);
         }

@@ -11,8 +11,8 @@ use crate::canvas::{CHUNK, Canvas};
 use crate::dataset::{Array, Attribute, Dataset, Variable};
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
 use crate::{
-    CoordinateSystem, Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Selection, Sphere, Time, UNSEEN,
-    cf, is_bad,
+    CoordinateSystem, Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Room, Selection, Sphere, Time,
+    UNSEEN, cf, is_bad,
 };
 
 /// Finds what is selected of a field.
@@ -76,6 +76,15 @@ struct Field {
 impl Maps for Field {
     fn times(&self) -> &[Time] {
         self.chosen.times()
+    }
+
+    fn room(&self) -> Option<Room> {
+        let (grid, cells) = match &self.cells {
+            Cells::All(grid, _) => (*grid, grid.pixels()),
+            Cells::Some(grid, _, places) => (*grid, 2 * places.len()),
+            Cells::Sizes(places, _) => (Healpix::new(self.nside?).ok()?, 4 * places.len()),
+        };
+        Some(Room::of(grid, size_of::<f64>() * cells))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {
