@@ -5,6 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use glam::{DVec3, dvec3};
 use longan_formats::{Healpix, Map};
 
 use super::Error;
@@ -118,22 +119,20 @@ pub struct Body {
     /// Half the size.
     half: f64,
     /// Centre, then base and height directions of its tangent plane.
-    frame: [Vector; 3],
+    frame: [DVec3; 3],
     /// Corners in the tangent plane, for telling inside from outside; empty for a cap.
     corners: Vec<[f64; 2]>,
     sides: Vec<Side>,
 }
 
-type Vector = [f64; 3];
-
 /// A side of a polygon: an arc of a great circle, shorter than π.
 #[derive(Clone, Debug)]
 struct Side {
-    start: Vector,
+    start: DVec3,
     /// Unit normal of the great circle.
-    normal: Vector,
+    normal: DVec3,
     /// Tangents at start and end that point along the arc; between them lie the points next to the side's interior.
-    towards: [Vector; 2],
+    towards: [DVec3; 2],
 }
 
 impl Body {
@@ -156,12 +155,11 @@ impl Body {
         let (lon, lat) = (lon.to_radians(), lat.to_radians());
         let (sin, cos) = position_angle.to_radians().sin_cos();
         let centre = unit_vector(FRAC_PI_2 - lat, lon);
-        let (east, north) = ([-lon.sin(), lon.cos(), 0.0], unit_vector(-lat, lon));
-        let base = combine(cos, east, -sin, north);
-        let height = combine(sin, east, cos, north);
+        let (east, north) = (dvec3(-lon.sin(), lon.cos(), 0.0), unit_vector(-lat, lon));
+        let base = cos * east - sin * north;
+        let height = sin * east + cos * north;
         let corners = shape.corners(half);
-        let points: Vec<Vector> =
-            corners.iter().map(|&[x, y]| normalised(combine(1.0, centre, 1.0, combine(x, base, y, height)))).collect();
+        let points: Vec<DVec3> = corners.iter().map(|&[x, y]| (centre + x * base + y * height).normalize()).collect();
         let sides = (0..points.len()).map(|i| Side::between(points[i], points[(i + 1) % points.len()])).collect();
         Ok(Body { half, frame: [centre, base, height], corners, sides })
     }
@@ -172,16 +170,15 @@ impl Body {
         self.signed_distance_of(unit_vector(theta, phi))
     }
 
-    fn signed_distance_of(&self, point: Vector) -> f64 {
+    fn signed_distance_of(&self, point: DVec3) -> f64 {
         let [centre, base, height] = self.frame;
         if self.sides.is_empty() {
-            let away = cross(point, centre);
-            return self.half - dot(away, away).sqrt().atan2(dot(point, centre));
+            return self.half - point.cross(centre).length().atan2(point.dot(centre));
         }
         let chord2 = self.sides.iter().map(|side| side.chord2(point)).fold(f64::INFINITY, f64::min);
         let distance = 2.0 * (chord2.sqrt() / 2.0).min(1.0).asin();
-        let depth = dot(point, centre);
-        let inside = depth > 0.0 && self.encloses(dot(point, base) / depth, dot(point, height) / depth);
+        let depth = point.dot(centre);
+        let inside = depth > 0.0 && self.encloses(point.dot(base) / depth, point.dot(height) / depth);
         if inside { distance } else { -distance }
     }
 
@@ -196,20 +193,19 @@ impl Body {
 }
 
 impl Side {
-    fn between(start: Vector, end: Vector) -> Self {
-        let normal = normalised(cross(start, end));
-        Side { start, normal, towards: [cross(normal, start), cross(normal, end)] }
+    fn between(start: DVec3, end: DVec3) -> Self {
+        let normal = start.cross(end).normalize();
+        Side { start, normal, towards: [normal.cross(start), normal.cross(end)] }
     }
 
     /// Squared chord to the nearest point of the side other than its end, which is the next side's start.
-    fn chord2(&self, point: Vector) -> f64 {
-        if dot(point, self.towards[0]) >= 0.0 && dot(point, self.towards[1]) <= 0.0 {
+    fn chord2(&self, point: DVec3) -> f64 {
+        if point.dot(self.towards[0]) >= 0.0 && point.dot(self.towards[1]) <= 0.0 {
             // The distance d from the great circle has sin d = |point · normal|; the chord is 2 sin(d/2).
-            let sin2 = dot(point, self.normal).powi(2);
+            let sin2 = point.dot(self.normal).powi(2);
             2.0 * sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())
         } else {
-            let away = combine(1.0, point, -1.0, self.start);
-            dot(away, away)
+            point.distance_squared(self.start)
         }
     }
 }
@@ -219,7 +215,7 @@ pub fn shapes(grid: Healpix, bodies: &[Body], edge: Edge) -> Map {
     let mut map = super::map("shapes", grid, |ring, values| {
         for (j, value) in values.iter_mut().enumerate() {
             let (sin, cos) = ring.phi(j as isize).sin_cos();
-            let point = [ring.sin_theta * cos, ring.sin_theta * sin, ring.cos_theta];
+            let point = dvec3(ring.sin_theta * cos, ring.sin_theta * sin, ring.cos_theta);
             let distance = bodies.iter().map(|body| body.signed_distance_of(point)).fold(-PI, f64::max);
             *value = match edge {
                 Edge::Binary => f64::from(distance >= -ON_BOUNDARY),
@@ -242,24 +238,8 @@ pub fn scene() -> Vec<Body> {
     Shape::ALL.into_iter().enumerate().map(at).collect()
 }
 
-fn unit_vector(theta: f64, phi: f64) -> Vector {
-    [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()]
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn combine(x: f64, a: Vector, y: f64, b: Vector) -> Vector {
-    std::array::from_fn(|i| x * a[i] + y * b[i])
-}
-
-fn normalised(a: Vector) -> Vector {
-    combine(1.0 / dot(a, a).sqrt(), a, 0.0, a)
+fn unit_vector(theta: f64, phi: f64) -> DVec3 {
+    dvec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
 }
 
 #[cfg(test)]
@@ -284,18 +264,17 @@ mod tests {
         (0..grid.pixels()).map(|p| grid.centre(p)).map(|(theta, phi)| (theta, phi + 0.01)).collect()
     }
 
-    fn separation(a: Vector, b: Vector) -> f64 {
-        let c = cross(a, b);
-        dot(c, c).sqrt().atan2(dot(a, b))
+    fn separation(a: DVec3, b: DVec3) -> f64 {
+        a.cross(b).length().atan2(a.dot(b))
     }
 
     /// Points on a body's boundary, `steps` a side, equally spaced on each.
-    fn boundary(body: &Body, steps: usize) -> Vec<Vector> {
+    fn boundary(body: &Body, steps: usize) -> Vec<DVec3> {
         if body.sides.is_empty() {
             let [centre, base, height] = body.frame;
             let around = |i: usize| {
                 let (sin, cos) = (2.0 * PI * i as f64 / steps as f64).sin_cos();
-                combine(body.half.cos(), centre, body.half.sin(), combine(cos, base, sin, height))
+                body.half.cos() * centre + body.half.sin() * (cos * base + sin * height)
             };
             return (0..steps).map(around).collect();
         }
@@ -305,7 +284,7 @@ mod tests {
             let (start, tangent) = (side.start, side.towards[0]);
             (0..steps)
                 .map(move |k| (length * k as f64 / steps as f64).sin_cos())
-                .map(move |(sin, cos)| combine(cos, start, sin, tangent))
+                .map(move |(sin, cos)| cos * start + sin * tangent)
         };
         body.sides.iter().enumerate().flat_map(along).collect()
     }
@@ -324,9 +303,9 @@ mod tests {
             Shape::Parallelogram => {
                 // Two triangles, by L'Huilier's formula in vector form.
                 let (x, y) = ((size / 2.0).tan(), (size / 4.0).tan());
-                let corner = |x: f64, y: f64| normalised([1.0, x, y]);
+                let corner = |x: f64, y: f64| dvec3(1.0, x, y).normalize();
                 let [a, b, c] = [corner(x + y, y), corner(-x + y, y), corner(-x - y, -y)];
-                4.0 * dot(a, cross(b, c)).abs().atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a))
+                4.0 * a.dot(b.cross(c)).abs().atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
             }
             Shape::Cap => 2.0 * PI * (1.0 - (size / 2.0).cos()),
         }
