@@ -207,6 +207,7 @@ impl Chart {
     fn draw_panel(&self, area: &Area<'_>, i: usize, axes: &Axes, lowest: bool) -> Result<(), Error> {
         let (panel, em) = (&self.panels[i], axes.em);
         let Frame { left, top, width, height } = axes.frame;
+        axes.draw_guides(area)?;
         for band in &panel.bands {
             let colour = BANDS[usize::from(band.inner)];
             let interrupted = |(x, low, high): &(f64, f64, f64)| ![x, low, high].iter().all(|v| v.is_finite());
@@ -221,7 +222,6 @@ impl Chart {
                 }
             }
         }
-        axes.draw_guides(area)?;
         for curve in &panel.curves {
             let places: Vec<_> = curve.points.iter().map(|(x, y)| axes.at(*x, *y)).collect();
             let colour = PALETTE[curve.colour % PALETTE.len()];
