@@ -208,6 +208,7 @@ impl Chart {
     fn draw_panel(&self, area: &Area<'_>, i: usize, axes: &Axes, lowest: bool) -> Result<(), Error> {
         let (panel, em) = (&self.panels[i], axes.em);
         let Frame { left, top, width, height } = axes.frame;
+        axes.draw_guides(area)?;
         for band in &panel.bands {
             let colour = BANDS[usize::from(band.inner)];
             let interrupted = |(x, low, high): &(f64, f64, f64)| ![x, low, high].iter().all(|v| v.is_finite());
@@ -222,7 +223,6 @@ impl Chart {
                 }
             }
         }
-        axes.draw_guides(area)?;
         for curve in &panel.curves {
             let places: Vec<_> = curve.points.iter().map(|(x, y)| axes.at(*x, *y)).collect();
             let colour = PALETTE[curve.colour % PALETTE.len()];
@@ -288,14 +288,14 @@ mod tests {
 
     /// Left end, right end and height of each text, in pixels; letters are taken to be as wide as they get on the mean.
     fn texts(svg: &str) -> Vec<(f64, f64, f64)> {
-        let texts = svg.split("<text ").skip(1).map(|text| {
+        let texts = svg.split("<text").skip(1).map(|text| {
             let number = |name: &str| {
                 let (_, rest) = text.split_once(&format!("{name}=\"")).unwrap();
                 rest.split_once('"').unwrap().0.parse::<f64>().unwrap() / 10.0
             };
             let letters = text.split_once('>').unwrap().1.split_once("</text>").unwrap().0.trim();
-            let width = 0.62 * number("font-size") * letters.chars().count() as f64;
-            let x = number(" x").max(0.0);
+            let width = 0.53 * number("font-size") * letters.chars().count() as f64;
+            let x = number(" x");
             let left = match text {
                 _ if text.contains("\"middle\"") => x - width / 2.0,
                 _ if text.contains("\"end\"") => x - width,
