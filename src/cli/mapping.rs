@@ -199,10 +199,10 @@ impl Mapper<'_> {
         command: &str,
         progress: impl Fn(f64),
     ) -> anyhow::Result<Made> {
-        let start = Instant::now();
         let Mapper { mapping, measures, mask, analysis, memory } = self;
         let mut series = mapping.input.open(path)?;
         let _taken = memory.take(series.room().and_then(|room| self.bytes(room))).with_context(|| shown(path))?;
+        let start = Instant::now();
         let steps = series.steps();
         let map = series.read(0, mask.as_ref())?;
         let about = || shown(path);
