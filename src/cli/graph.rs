@@ -8,20 +8,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::{Context, bail, ensure};
-use clap::{Args, ValueEnum};
+use anyhow::{Context, ensure};
+use clap::Args;
 use longan::formats;
 use longan::gaussian::Gaussian;
-use longan::measures::{CatalogueError, Measure, split};
+use longan::measures::{Measure, split};
 use longan::picture::axes::PALETTE;
 use longan::region::RegionError;
 use longan::statistics::Statistics;
 use longan::totals::Totals;
-use longan::{Analysis, AnalysisError, Body, Map, Region, ThresholdUnit, Weight};
+use longan::{Analysis, AnalysisError, Body, Map, Region, ThresholdUnit};
 
+use super::drawn::{Form, save};
 use super::input::{Input, Mask, Series};
+use super::mapping::{find, no_measure};
 use super::misused;
-use super::options::{BodyOptions, Running, between, check_memory, nside, shown};
+use super::options::{BodyOptions, Running, WeightOption, between, check_memory, nside, shown};
 use super::plugin::Plugins;
 use super::progress::Progress;
 use ensemble::Ensemble;
@@ -99,12 +101,6 @@ pub(crate) struct Arguments {
     overwrite: bool,
     #[command(flatten)]
     running: Running,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum WeightOption {
-    Length,
-    Curvature,
 }
 
 /// Thresholds where none are given, in standard deviations.
@@ -235,7 +231,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let table = table::csv(&plan, &data, ensemble.as_ref())?;
     let picture = match &outputs.picture {
-        Some((_, format)) => Some(picture::draw(&plan, &data, ensemble.as_ref(), *format)?),
+        Some((_, form)) => Some(form.bytes(&picture::draw(&plan, &data, ensemble.as_ref())?)?),
         None => None,
     };
     outputs.save(&table, picture.as_deref(), arguments.overwrite)?;
@@ -246,9 +242,6 @@ impl Arguments {
     /// What is to be done, after all checks of the arguments.
     fn plan(&self) -> anyhow::Result<Plan> {
         let catalogue = self.plugins.catalogue()?;
-        let wrong = |text: &str, problem: String| {
-            misused("graph", format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
-        };
         let (mut quantities, mut measures) = (Vec::<Quantity>::new(), Vec::new());
         let mut texts: Vec<&str> = self.measure.iter().flat_map(|list| split(list)).collect();
         if texts.is_empty() {
@@ -259,15 +252,12 @@ impl Arguments {
             let quantity = match density {
                 Some(density) => Quantity { name: density.name.to_owned(), kind: Kind::Density(density) },
                 None => {
-                    let measure = catalogue.find(text).map_err(|e| match &e {
-                        CatalogueError::Formula(formula) => wrong(text, format!("{e}\n\n{}", formula.marked())),
-                        _ => wrong(text, e.to_string()),
-                    })?;
+                    let measure = find(&catalogue, text, "graph")?;
                     let name = measure.name();
                     if name.ends_with("-direction") {
                         let problem = "directions count from the south of each place, so that a mean of them means \
                                        nothing; take a formula such as 'x = psi2.re/psi0.re'";
-                        return Err(wrong(text, problem.to_owned()));
+                        return Err(no_measure(text, problem, "graph"));
                     }
                     // Beside the measure per area of the same name.
                     let twin = DENSITIES.iter().any(|density| density.name == name);
@@ -277,7 +267,7 @@ impl Arguments {
                 }
             };
             if quantities.iter().any(|other| other.name.eq_ignore_ascii_case(&quantity.name)) {
-                return Err(wrong(text, format!("'{}' is given twice", quantity.name)));
+                return Err(no_measure(text, format!("'{}' is given twice", quantity.name), "graph"));
             }
             quantities.push(quantity);
         }
@@ -290,10 +280,7 @@ impl Arguments {
             windows: vec![self.window],
             nside_out: self.nside_out,
             max_masked: self.max_masked,
-            weight: match self.weight {
-                WeightOption::Length => Weight::Length,
-                WeightOption::Curvature => Weight::Curvature,
-            },
+            weight: self.weight.weight(),
             ..self.body.analysis()
         };
         if self.body.thresholds.is_none() {
@@ -305,19 +292,16 @@ impl Arguments {
     /// The files to write, once it is clear that they can be.
     fn outputs(&self) -> anyhow::Result<Outputs> {
         let output = &self.output;
-        let extension = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        let format = match extension.as_str() {
-            "png" => Some(Format::Png),
-            "svg" => Some(Format::Svg),
-            "csv" => None,
-            _ => bail!(
-                "{}: the name does not say in which format to write; end it in .png or .svg for a picture, in .csv for \
-                 the numbers alone",
-                shown(output)
-            ),
-        };
-        let (picture, table) = match format {
-            Some(format) => (Some((output.clone(), format)), output.with_extension("csv")),
+        let form = Form::of(output);
+        let is_table = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+        ensure!(
+            form.is_some() || is_table,
+            "{}: the name does not say in which format to write; end it in .png or .svg for a picture, in .csv for the \
+             numbers alone",
+            shown(output)
+        );
+        let (picture, table) = match form {
+            Some(form) => (Some((output.clone(), form)), output.with_extension("csv")),
             None => (None, output.clone()),
         };
         for path in picture.iter().map(|(path, _)| path).chain([&table]) {
@@ -501,29 +485,17 @@ impl Curves {
     }
 }
 
-/// Forms of pictures.
-#[derive(Clone, Copy)]
-enum Format {
-    Png,
-    Svg,
-}
-
 /// The files to write.
 struct Outputs {
-    picture: Option<(PathBuf, Format)>,
+    picture: Option<(PathBuf, Form)>,
     table: PathBuf,
 }
 
 impl Outputs {
     fn save(&self, table: &[u8], picture: Option<&[u8]>, overwrite: bool) -> anyhow::Result<()> {
-        let write = |path: &Path, bytes: &[u8]| {
-            formats::save(path, overwrite, |temporary| {
-                std::fs::write(temporary, bytes).map_err(|cause| formats::Error::Io { action: "write it", cause })
-            })
-        };
-        write(&self.table, table)?;
+        save(&self.table, overwrite, table)?;
         if let (Some((path, _)), Some(picture)) = (&self.picture, picture) {
-            write(path, picture)?;
+            save(path, overwrite, picture)?;
         }
         Ok(())
     }

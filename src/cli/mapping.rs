@@ -8,17 +8,17 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use longan::formats::{Error, Healpix, Map, Room};
-use longan::measures::{CatalogueError, Measure, split};
+use longan::measures::{Catalogue, CatalogueError, Measure, split};
 use longan::statistics::{Statistics, statistics};
 use longan::window::{Summation, Ways};
-use longan::{Analysis, AnalysisError, MinkowskiMaps, Weight};
+use longan::{Analysis, AnalysisError, MinkowskiMaps};
 
 use super::input::{self, Input, Mask};
 use super::jobs::Memory;
 use super::misused;
-use super::options::{BodyOptions, between, check_memory, decimals, is_same_file, nside, shown};
+use super::options::{BodyOptions, WeightOption, between, check_memory, decimals, is_same_file, nside, shown};
 use super::output::Provenance;
 use super::plugin::Plugins;
 use super::sink::{self, Kind, LayoutOptions};
@@ -74,12 +74,6 @@ const DEFAULT: &str = "evq";
 /// Columns that a FITS table can have.
 const COLUMNS_MAX: usize = 999;
 
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-enum WeightOption {
-    Length,
-    Curvature,
-}
-
 impl Mapping {
     /// What maps files, once it is clear that the mask can be read.
     pub(crate) fn mapper(&self, measures: Vec<Arc<dyn Measure>>, memory: Memory) -> anyhow::Result<Mapper<'_>> {
@@ -127,19 +121,13 @@ impl Mapping {
     /// The measures asked for, no two the same. `command` is whose arguments these are.
     pub(crate) fn measures(&self, command: &str) -> anyhow::Result<Vec<Arc<dyn Measure>>> {
         let catalogue = self.plugins.catalogue()?;
-        let wrong = |text: &str, problem: String| {
-            misused(command, format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
-        };
         let mut measures: Vec<Arc<dyn Measure>> = Vec::new();
         for text in self.names() {
-            let measure = catalogue.find(text).map_err(|e| match &e {
-                CatalogueError::Formula(formula) => wrong(text, format!("{e}\n\n{}", formula.marked())),
-                _ => wrong(text, e.to_string()),
-            })?;
+            let measure = find(&catalogue, text, command)?;
             if let Some(other) = measures.iter().find(|other| other.column().eq_ignore_ascii_case(&measure.column())) {
                 let [one, other] = [measure.name(), other.name()];
                 let twice = if one == other { "is given twice".into() } else { format!("has the column of '{other}'") };
-                return Err(wrong(text, format!("'{one}' {twice}")));
+                return Err(no_measure(text, format!("'{one}' {twice}"), command));
             }
             measures.push(measure);
         }
@@ -158,16 +146,26 @@ impl Mapping {
     fn analysis(&self) -> Analysis {
         Analysis {
             windows: self.window.clone(),
-            weight: match self.weight {
-                WeightOption::Length => Weight::Length,
-                WeightOption::Curvature => Weight::Curvature,
-            },
+            weight: self.weight.weight(),
             nside_out: self.nside_out,
             max_masked: self.max_masked,
             summation: if self.exact { Summation::Exact } else { Summation::Tolerance(self.tolerance) },
             ..self.body.analysis()
         }
     }
+}
+
+/// The measure of a name or formula.
+pub(crate) fn find(catalogue: &Catalogue, text: &str, command: &str) -> anyhow::Result<Arc<dyn Measure>> {
+    catalogue.find(text).map_err(|e| match &e {
+        CatalogueError::Formula(formula) => no_measure(text, format!("{e}\n\n{}", formula.marked()), command),
+        _ => no_measure(text, e.to_string(), command),
+    })
+}
+
+/// What is said of a text that names no measure that can be taken.
+pub(crate) fn no_measure(text: &str, problem: impl fmt::Display, command: &str) -> anyhow::Error {
+    misused(command, format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
 }
 
 /// A computation that is ready for files; several threads may share it.

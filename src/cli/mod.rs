@@ -6,6 +6,7 @@
 
 mod compare;
 mod demo;
+mod drawn;
 mod graph;
 mod info;
 mod input;

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use longan::formats::Healpix;
-use longan::{Analysis, Body, ThresholdUnit, Thresholds};
+use longan::{Analysis, Body, ThresholdUnit, Thresholds, Weight};
 
 /// Thresholds and the body that they cut out.
 #[derive(Args, Clone, Debug, PartialEq)]
@@ -60,6 +60,23 @@ pub(crate) enum Format {
 pub(crate) enum BodyOption {
     Above,
     Below,
+}
+
+/// Weights of the contour's pieces.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub(crate) enum WeightOption {
+    Length,
+    Curvature,
+}
+
+impl WeightOption {
+    /// The weight.
+    pub(crate) fn weight(self) -> Weight {
+        match self {
+            WeightOption::Length => Weight::Length,
+            WeightOption::Curvature => Weight::Curvature,
+        }
+    }
 }
 
 /// Units of thresholds.

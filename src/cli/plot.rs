@@ -10,14 +10,15 @@ use anyhow::{Context, bail};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use longan::contour::Field as Contoured;
-use longan::formats::{self, At, Error, Field, Map, Selection, Sphere};
+use longan::formats::{self, At, Field, Map, Selection, Sphere};
 use longan::picture::projection::{self, Equirectangular, Gnomonic, Hammer, Mollweide, Orthographic, Projection};
 use longan::picture::{
-    Circle, Colouring, Colours, Drawing, Mark, Meaning, Options, Orientation, Overlays, Rods, View, WIDTHS, contours,
-    draw, superscript,
+    Circle, Colouring, Colours, Mark, Meaning, Options, Orientation, Overlays, Rods, View, WIDTHS, contours, draw,
+    superscript,
 };
 use longan::{Body, Thresholds};
 
+use super::drawn::{Form, save};
 use super::input::{Input, Mask, field, place};
 use super::misused;
 use super::options::{Running, finite, shown};
@@ -139,13 +140,6 @@ enum OrientationOption {
     Earth,
 }
 
-/// The formats of pictures.
-#[derive(Clone, Copy)]
-enum Kind {
-    Png,
-    Svg,
-}
-
 /// Side of a gnomonic picture in degrees.
 const SIZE: f64 = 20.0;
 
@@ -154,7 +148,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let start = Instant::now();
     let Arguments { input_file: path, output, running, .. } = arguments;
     let projection = arguments.projection()?;
-    let kind = Kind::of(output)?;
+    let no_form = || format!("{}: the name does not say which picture to write; end it in .png or .svg", shown(output));
+    let form = Form::of(output).with_context(no_form)?;
     formats::check_writable(output, arguments.overwrite)?;
     let mask = arguments.input.mask()?;
     let map = arguments.read(&arguments.input, path, mask.as_ref())?;
@@ -190,10 +185,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         width: arguments.width,
     };
     let drawing = draw(map.values(), &options).with_context(|| shown(path))?;
-    let bytes = kind.bytes(&drawing)?;
-    formats::save(output, arguments.overwrite, |temporary| {
-        std::fs::write(temporary, &bytes).map_err(|cause| Error::Io { action: "write it", cause })
-    })?;
+    save(output, arguments.overwrite, &form.bytes(&drawing)?)?;
     let (nside, seconds) = (map.grid().nside(), start.elapsed().as_secs_f64());
     running.say(format_args!("{}: {} of Nside {nside} ({seconds:.2} s)", shown(output), map.name))
 }
@@ -295,24 +287,6 @@ impl Arguments {
             None if is_said => String::new(),
             None => map.name.trim().to_owned(),
         }
-    }
-}
-
-impl Kind {
-    /// The format that a file's name asks for.
-    fn of(path: &Path) -> anyhow::Result<Self> {
-        match path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase().as_str() {
-            "png" => Ok(Kind::Png),
-            "svg" => Ok(Kind::Svg),
-            _ => bail!("{}: the name does not say which picture to write; end it in .png or .svg", shown(path)),
-        }
-    }
-
-    fn bytes(self, drawing: &Drawing) -> anyhow::Result<Vec<u8>> {
-        Ok(match self {
-            Kind::Png => drawing.png()?,
-            Kind::Svg => drawing.svg().as_bytes().to_vec(),
-        })
     }
 }
 

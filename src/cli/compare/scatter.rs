@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{Context, bail};
-use longan::formats::{self, Error, Healpix};
+use longan::formats::Healpix;
 use longan::picture::cloud::{Cloud, Quantity};
 
+use super::super::drawn::{Form, save};
 use super::super::options::{between, shown};
 use super::said::Column;
 
@@ -39,6 +40,7 @@ pub(super) struct Scatter {
     names: [String; 2],
     table: PathBuf,
     picture: PathBuf,
+    form: Form,
 }
 
 impl Scatter {
@@ -47,11 +49,9 @@ impl Scatter {
         let names = pair.split_once(',').map(|(x, y)| [x, y].map(|name| name.trim().to_owned()));
         let names = names.filter(|names| names.iter().all(|name| !name.is_empty() && !name.contains(',')));
         let names = names.ok_or("not two measures, such as evq,rank4-mid")?;
-        let extension = picture.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        if !["png", "svg"].contains(&extension.as_str()) {
-            return Err(format!("the picture's name '{}' ends neither in .png nor in .svg", shown(&picture)));
-        }
-        Ok(Scatter { at, names, table: picture.with_extension("csv"), picture })
+        let form = Form::of(&picture)
+            .ok_or_else(|| format!("the picture's name '{}' ends neither in .png nor in .svg", shown(&picture)))?;
+        Ok(Scatter { at, names, table: picture.with_extension("csv"), picture, form })
     }
 
     /// The files that it makes.
@@ -92,8 +92,7 @@ impl Scatter {
         let star = points.remove(0);
         let legend = [format!("{} simulations", points.len()), files[0].to_string_lossy().into_owned()];
         let drawing = Cloud { x, y, points, star, legend }.draw().with_context(|| shown(&self.picture))?;
-        let svg = self.picture.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
-        let picture = if svg { drawing.svg().as_bytes().to_vec() } else { drawing.png().context("the picture")? };
+        let picture = self.form.bytes(&drawing).with_context(|| shown(&self.picture))?;
         save(&self.table, overwrite, &table)?;
         save(&self.picture, overwrite, &picture)?;
         Ok(self.outputs().map(shown).to_vec())
@@ -111,9 +110,4 @@ fn table(files: &[&Path], points: &[[f64; 2]], columns: [&Column; 2]) -> anyhow:
         table.write_record([kind, &file.to_string_lossy(), &x, &y])?;
     }
     Ok(table.into_inner()?)
-}
-
-fn save(path: &Path, overwrite: bool, bytes: &[u8]) -> Result<(), Error> {
-    let write = |path: &Path| std::fs::write(path, bytes).map_err(|cause| Error::Io { action: "write it", cause });
-    formats::save(path, overwrite, write)
 }

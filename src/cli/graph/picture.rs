@@ -1,11 +1,12 @@
 //! The picture of a graph: a panel for each measure, curves of all maps, bands of the ensemble.
 
 use longan::Body;
+use longan::picture::Drawing;
 use longan::picture::axes::BLACK;
 use longan::picture::chart::{Band, Chart, Curve, Panel, Sample, Shared};
 
 use super::ensemble::{Ensemble, percentile, quantile};
-use super::{Curves, Format, Kind, Plan, Quantity};
+use super::{Curves, Kind, Plan, Quantity};
 
 /// Lower ends of the bands, as shares of the ensemble; the upper ones are as far from 1.
 const BANDS: [f64; 2] = [0.025, 0.16];
@@ -16,18 +17,9 @@ const EVEN: f64 = 1e-9;
 /// Points of a smooth curve from one threshold to the next.
 const FINER: usize = 8;
 
-/// The bytes of the picture.
-pub(super) fn draw(
-    plan: &Plan,
-    data: &[Curves],
-    ensemble: Option<&Ensemble>,
-    format: Format,
-) -> anyhow::Result<Vec<u8>> {
-    let drawing = chart(plan, data, ensemble).draw()?;
-    Ok(match format {
-        Format::Png => drawing.png()?,
-        Format::Svg => drawing.svg().as_bytes().to_vec(),
-    })
+/// The picture.
+pub(super) fn draw(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> anyhow::Result<Drawing> {
+    Ok(chart(plan, data, ensemble).draw()?)
 }
 
 fn chart(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> Chart {
