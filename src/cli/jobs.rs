@@ -105,7 +105,7 @@ impl Memory {
             ensure!(
                 bytes <= self.total,
                 "this needs about {} of memory, and --memory allows {}; allow more",
-                shown(bytes + PROGRAM),
+                shown(bytes.saturating_add(PROGRAM)),
                 shown(asked)
             );
         }

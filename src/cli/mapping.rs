@@ -254,7 +254,7 @@ impl Mapper<'_> {
     /// About how many bytes it takes to map a file, where that shows before it is read.
     fn bytes(&self, room: Room) -> Option<usize> {
         let grid = Healpix::new(room.nside).ok()?;
-        let mask = if self.mask.is_some() { grid.pixels() * size_of::<f64>() } else { 0 };
+        let mask = if self.mask.is_some() { grid.pixels().saturating_mul(size_of::<f64>()) } else { 0 };
         // Where there is an error, mapping says so.
         let maps = self.analysis.memory(grid, &self.measures, self.mapping.sequence).ok()?;
         Some(room.bytes.saturating_add(mask).saturating_add(maps))
