@@ -183,7 +183,7 @@ pub(crate) fn memory(input: Healpix, output: Healpix, radius: f64, rows: usize) 
     let group = (GROUP as f64 * PI / output.rings() as f64).min(radius);
     // The widest zone is about the equator.
     let share = (radius + group + band / 2.0).min(FRAC_PI_2).sin();
-    (share * output.pixels() as f64) as usize * (rows + 1) * size_of::<f64>()
+    (share * output.pixels() as f64 * ((rows + 1) * size_of::<f64>()) as f64) as usize
 }
 
 /// About how many bytes the moments of a band of input rings take.

@@ -18,6 +18,8 @@ mod families;
 mod formulas;
 /// Fields on grids of latitude and longitude, made by hand.
 mod gridded;
+/// Many maps at a time, in parts, and in spite of kills.
+mod many_maps;
 /// `longan map` on one input.
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.

@@ -72,14 +72,16 @@ impl Maps for Series {
     }
 
     fn room(&self) -> Option<Room> {
-        let (values, pixels) = (self.from.values(), self.to.pixels());
-        // Weights grow with half their room empty.
-        let weights = 2 * match self.selection.regrid.method {
-            Method::Conservative => values + 4 * pixels,
-            Method::Bilinear => 4 * pixels,
+        let (values, pixels) = (self.from.values() as f64, self.to.pixels() as f64);
+        let weights = match self.selection.regrid.method {
+            // Cells of a grid that lies askew on another.
+            Method::Conservative => (values.sqrt() + pixels.sqrt()).powi(2),
+            Method::Bilinear => 4.0 * pixels,
             Method::Nearest => pixels,
         };
-        Some(Room::of(self.to, 2 * size_of::<f64>() * values + 8 * pixels + 12 * weights))
+        // The field, twice; where each pixel's weights end; weights and places, in arrays that may have grown to twice
+        // their length.
+        Some(Room::of(self.to, (16.0 * values + 8.0 * pixels + 24.0 * weights) as usize))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {

@@ -9,6 +9,8 @@ use anyhow::ensure;
 use clap::Args;
 use sysinfo::{MemoryRefreshKind, System};
 
+use super::progress::give_back;
+
 /// How many maps are computed at a time.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Running")]
@@ -34,6 +36,7 @@ impl Jobs {
 
     /// Does all of some tasks, several at a time, and begins them in their order; the results are in that order too.
     pub(crate) fn run<T: Sync, R: Send>(&self, tasks: &[T], each: impl Fn(&T) -> R + Sync) -> Vec<R> {
+        return_at_once();
         let threads = self.jobs.map_or_else(rayon::current_num_threads, usize::from).clamp(1, tasks.len().max(1));
         let next = AtomicUsize::new(0);
         let work = || {
@@ -59,6 +62,16 @@ impl Jobs {
 
 /// Memory that the program takes without any map: its libraries, and what the allocators of several threads keep.
 const PROGRAM: u64 = 32 << 20;
+
+/// Has large arrays returned to the system when they are freed. GNU's allocator would come to keep them, a heap for each
+/// thread, so that maps took more than the sum of theirs.
+fn return_at_once() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: the function only sets from which size on arrays are mapped by themselves.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, 1 << 20);
+    }
+}
 
 /// Memory that is free on this machine, or in the container that this is.
 fn free_memory() -> u64 {
@@ -92,7 +105,7 @@ impl Memory {
             ensure!(
                 bytes <= self.total,
                 "this needs about {} of memory, and --memory allows {}; allow more",
-                shown(bytes + PROGRAM),
+                shown(bytes.saturating_add(PROGRAM)),
                 shown(asked)
             );
         }
@@ -112,6 +125,7 @@ impl Memory {
 
 impl Drop for Taken<'_> {
     fn drop(&mut self) {
+        give_back();
         *self.memory.free() += self.bytes;
         self.memory.given_back.notify_all();
     }

@@ -169,7 +169,10 @@ impl Arguments {
         }
         for (_, output) in &tasks {
             Kind::of(output)?;
-            formats::check_writable(output, self.overwrite)?;
+            match formats::check_writable(output, self.overwrite) {
+                Err(e) if self.resume && is_exists(&e) => (),
+                checked => checked?,
+            }
         }
         Ok(tasks)
     }
@@ -203,7 +206,10 @@ impl Arguments {
 
     fn one(&self, mapper: &Mapper<'_>, progress: &Progress, input: &Path, output: &Path) -> anyhow::Result<()> {
         let part = progress.part();
-        let meanwhile = || self.running.say(format_args!("{}: made by another run meanwhile", shown(output)));
+        let meanwhile = || {
+            self.check_finished(input, output)?;
+            self.running.say(format_args!("{}: made by another run meanwhile", shown(output)))
+        };
         // Of what this run began with, much may have been done by others.
         if self.resume && output.is_file() {
             drop(part);
@@ -211,7 +217,7 @@ impl Arguments {
         }
         let command = command(&self.inputs, input);
         let made = match mapper.map(input, output, self.overwrite, &command, |share| part.set(share)) {
-            Err(e) if self.resume && is_exists(&e) => None,
+            Err(e) if self.resume && e.downcast_ref().is_some_and(is_exists) => None,
             made => Some(made?),
         };
         drop(part);
@@ -231,10 +237,10 @@ impl Arguments {
 }
 
 /// Whether the reason for an error is that the output exists.
-fn is_exists(error: &anyhow::Error) -> bool {
-    match error.downcast_ref() {
-        Some(Error::File { problem, .. }) => matches!(**problem, Error::Exists),
-        _ => false,
+fn is_exists(error: &Error) -> bool {
+    match error {
+        Error::File { problem, .. } => is_exists(problem),
+        error => matches!(error, Error::Exists),
     }
 }
 

@@ -199,10 +199,10 @@ impl Mapper<'_> {
         command: &str,
         progress: impl Fn(f64),
     ) -> anyhow::Result<Made> {
-        let start = Instant::now();
         let Mapper { mapping, measures, mask, analysis, memory } = self;
         let mut series = mapping.input.open(path)?;
         let _taken = memory.take(series.room().and_then(|room| self.bytes(room))).with_context(|| shown(path))?;
+        let start = Instant::now();
         let steps = series.steps();
         let map = series.read(0, mask.as_ref())?;
         let about = || shown(path);
@@ -256,7 +256,7 @@ impl Mapper<'_> {
     /// About how many bytes it takes to map a file, where that shows before it is read.
     fn bytes(&self, room: Room) -> Option<usize> {
         let grid = Healpix::new(room.nside).ok()?;
-        let mask = if self.mask.is_some() { grid.pixels() * size_of::<f64>() } else { 0 };
+        let mask = if self.mask.is_some() { grid.pixels().saturating_mul(size_of::<f64>()) } else { 0 };
         // Where there is an error, mapping says so.
         let maps = self.analysis.memory(grid, &self.measures, self.mapping.sequence).ok()?;
         Some(room.bytes.saturating_add(mask).saturating_add(maps))

@@ -93,7 +93,7 @@ pub(crate) fn rate(done: usize, time: Duration) -> String {
 
 /// Returns to the system what finished windows took. GNU's allocator would keep it until the end, when the whole output
 /// needs the room.
-fn give_back() {
+pub(crate) fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: the function only releases pages that nothing is allocated in; it may be called at any time.
     unsafe {

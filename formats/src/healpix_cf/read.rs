@@ -73,7 +73,7 @@ impl Maps for Field {
             Cells::Some(grid, _, places) => (*grid, 2 * places.len()),
             Cells::Sizes(places, _) => (Healpix::new(self.nside?).ok()?, 4 * places.len()),
         };
-        Some(Room::of(grid, size_of::<f64>() * cells))
+        Some(Room::of(grid, cells.saturating_mul(size_of::<f64>())))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {

@@ -78,7 +78,7 @@ impl Maps for One {
         let beside = match self.table.layout {
             table::Layout::Implicit { .. } => 0,
             table::Layout::Explicit { .. } => grid.pixels() / 8,
-            table::Layout::MultiOrder { .. } => 16 * self.table.rows,
+            table::Layout::MultiOrder { .. } => self.table.rows.saturating_mul(16),
         };
         Some(Room::of(grid, beside))
     }
