@@ -16,6 +16,8 @@ mod compare;
 mod families;
 /// Measures as formulas.
 mod formulas;
+/// `longan graph`.
+mod graph;
 /// Fields on grids of latitude and longitude, made by hand.
 mod gridded;
 /// Many maps at a time, in parts, and in spite of kills.

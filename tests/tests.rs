@@ -2,6 +2,8 @@
 
 /// The program, run as users run it.
 mod cli;
+/// Thresholds by themselves, regions, and Gaussian skies.
+mod graphs;
 /// Files exchanged with healpy.
 mod healpy;
 /// What holds for any map: Gauss–Bonnet, symmetry, duality, additivity, threads.

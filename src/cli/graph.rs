@@ -190,10 +190,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let plan = arguments.plan()?;
     let outputs = arguments.outputs()?;
     let mask = arguments.input.mask()?;
-    let mut inputs = arguments.open(&arguments.inputs)?;
-    let mut simulations = arguments.open(&arguments.ensemble)?;
-    let count = |files: &[(PathBuf, Series)]| files.iter().map(|(_, series)| series.steps()).sum::<usize>();
-    let (curves, all) = (count(&inputs), count(&inputs) + count(&simulations));
+    let (curves, simulations) = (arguments.maps_in(&arguments.inputs)?, arguments.maps_in(&arguments.ensemble)?);
+    let all = curves + simulations;
     ensure!(
         outputs.picture.is_none() || curves <= PALETTE.len(),
         "{curves} maps are more than the {} that a picture tells apart; choose times with --select, or write the \
@@ -202,7 +200,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         shown(&outputs.table)
     );
     if !arguments.ensemble.is_empty() {
-        let simulations = count(&simulations);
         ensure!(simulations > 1, "an ensemble of one simulation has no scatter; name more files after --ensemble");
         if simulations < FEWEST {
             arguments.running.warn(format_args!(
@@ -214,22 +211,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let progress = Progress::new(shown(&arguments.output), arguments.running.quiet);
     let mut done = 0;
-    let mut all_of = |files: &mut [(PathBuf, Series)], keep: &mut dyn FnMut(Curves)| -> anyhow::Result<()> {
-        for (path, series) in files {
+    let mut all_of = |files: &[PathBuf], keep: &mut dyn FnMut(Curves)| -> anyhow::Result<()> {
+        for path in files {
+            let mut series = arguments.input.open(path)?;
             for step in 0..series.steps() {
                 let told = |share: f64| progress.set((done as f64 + share) / all as f64);
-                if let Some(curves) = arguments.one(&plan, path, series, step, mask.as_ref(), told)? {
+                if let Some(curves) = arguments.one(&plan, path, &mut series, step, mask.as_ref(), told)? {
                     keep(curves);
                 }
                 done += 1;
+                progress.set(done as f64 / all as f64);
             }
         }
         Ok(())
     };
     let mut data = Vec::new();
-    all_of(&mut inputs, &mut |curves| data.push(curves))?;
-    let mut ensemble = (!simulations.is_empty()).then(Ensemble::default);
-    all_of(&mut simulations, &mut |curves| ensemble.iter_mut().for_each(|ensemble| ensemble.add(&curves)))?;
+    all_of(&arguments.inputs, &mut |curves| data.push(curves))?;
+    let mut ensemble = (simulations > 0).then(Ensemble::default);
+    all_of(&arguments.ensemble, &mut |curves| ensemble.iter_mut().for_each(|ensemble| ensemble.add(&curves)))?;
     drop(progress);
     ensure!(!data.is_empty(), "{}: every map is masked or constant", shown(&arguments.inputs[0]));
     let ensemble = ensemble.map(Ensemble::sorted);
@@ -332,8 +331,9 @@ impl Arguments {
         Ok(Outputs { picture, table })
     }
 
-    fn open(&self, paths: &[PathBuf]) -> anyhow::Result<Vec<(PathBuf, Series)>> {
-        paths.iter().map(|path| Ok((path.clone(), self.input.open(path)?))).collect()
+    /// How many maps there are in files, once it is clear that all can be opened.
+    fn maps_in(&self, paths: &[PathBuf]) -> anyhow::Result<usize> {
+        paths.iter().map(|path| Ok(self.input.open(path)?.steps())).sum()
     }
 
     /// The curves of one map; nothing, with a warning, of one among several steps that has nothing to measure.
@@ -406,12 +406,15 @@ impl Plan {
         let (thresholds, of_map) = analysis.thresholds_of(map)?;
         let thresholds = thresholds.values().to_vec();
         let densities = self.quantities.iter().any(|quantity| matches!(quantity.kind, Kind::Density(_)));
-        let centres = match &self.region {
-            Some(region) => region.pixels(grid),
-            None => vec![true; grid.pixels()],
-        };
-        ensure!(self.measures.is_empty() || centres.contains(&true), Nothing::NoWindow);
-        check_memory(grid, thresholds.len() * self.measures.len())?;
+        let mut centres = Vec::new();
+        if !self.measures.is_empty() {
+            check_memory(grid, thresholds.len() * self.measures.len())?;
+            centres = match &self.region {
+                Some(region) => region.pixels(grid),
+                None => vec![true; grid.pixels()],
+            };
+            ensure!(centres.contains(&true), Nothing::NoWindow);
+        }
         let gaussian = match self.gaussian {
             true => Some(Gaussian::of(map).ok_or(Nothing::NoGaussian)?),
             false => None,

@@ -22,6 +22,9 @@ pub const PALETTE: [RGBColor; 7] = [
     RGBColor(230, 159, 0),
 ];
 
+/// The place of black in the [`PALETTE`].
+pub const BLACK: usize = 4;
+
 /// Letters, frames and ticks.
 pub const INK: RGBColor = RGBColor(30, 30, 30);
 
@@ -167,8 +170,8 @@ impl Axes {
             let longest = marks.labels.iter().map(|label| label.chars().count()).max().unwrap_or(0);
             ((longest + 2) * marks.labels.len()) as f64 <= room
         };
-        let all = (1..=MOST + 3).rev().map(|most| self.x.ticks(most));
-        all.clone().find(fits).or(all.last()).expect("some number of ticks")
+        let mut all = (1..=MOST + 3).rev().map(|most| self.x.ticks(most));
+        all.find(fits).unwrap_or_else(|| self.x.ticks(1))
     }
 
     fn y_marks(&self) -> Marks {
@@ -189,6 +192,16 @@ impl Axes {
         let letters = Letters::new(self.em * SMALL);
         let widths = self.y_marks().labels.into_iter().map(|label| letters.width(area, &label));
         Ok(widths.collect::<Result<Vec<_>, _>>()?.into_iter().fold(0.0, f64::max) + TICK * self.em * 2.0)
+    }
+
+    /// By how much the labels below the frame may reach beyond its ends, in pixels.
+    ///
+    /// # Errors
+    /// Where letters cannot be measured.
+    pub fn label_overhang(&self, area: &Area<'_>) -> Result<f64, Error> {
+        let letters = Letters::new(self.em * SMALL);
+        let widths = self.x_marks().labels.into_iter().map(|label| letters.width(area, &label));
+        Ok(widths.collect::<Result<Vec<_>, _>>()?.into_iter().fold(0.0, f64::max) / 2.0)
     }
 
     /// Height of the labels below the frame, with their distance from it, in pixels.
@@ -222,8 +235,10 @@ impl Axes {
         let Frame { left, top, width, height } = self.frame;
         let (right, bottom) = (left + width, top + height);
         let line = INK.stroke_width(stroke(self.em, 0.05));
-        let outline = Rectangle::new([(units(left), units(top)), (units(right), units(bottom))], line);
-        area.draw(&outline).map_err(failed)?;
+        // Once round and on, so that all corners are joined.
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top), (right, top)];
+        let outline = corners.map(|(x, y)| (units(x), units(y))).to_vec();
+        area.draw(&PathElement::new(outline, line)).map_err(failed)?;
         let letters = Letters::new(self.em * SMALL);
         let tick = TICK * self.em;
         let marks = self.y_marks();

@@ -78,6 +78,8 @@ pub enum Sample {
     Bands,
     /// A dot.
     Dot,
+    /// Nothing: a text about all that is drawn.
+    None,
 }
 
 /// A chart.
@@ -124,22 +126,23 @@ impl Chart {
         let column_width = (f64::from(WIDTH) - GAP * em) / columns as f64;
         let mut axes: Vec<Axes> = self.panels.iter().map(|panel| self.axes(panel, em)).collect();
         // Frames of a column are as wide as the widest labels there allow.
-        let mut left = vec![0.0; columns];
+        let (mut left, mut right) = (vec![0.0; columns], 0.0);
         for (i, axes) in axes.iter_mut().enumerate() {
-            axes.frame.height = column_width * ASPECT * 0.8;
+            axes.frame = Frame { width: column_width * 0.8, height: column_width * ASPECT * 0.8, ..axes.frame };
             let label = axes.label_width(area)?;
             left[i % columns] = f64::max(left[i % columns], label);
+            right = f64::max(right, axes.label_overhang(area)?);
         }
+        let widest = left.iter().copied().fold(0.0, f64::max);
         let mut top = below_legend;
         for row in 0..count.div_ceil(columns) {
             top += 1.7 * em;
-            let widest = left.iter().copied().fold(0.0, f64::max);
-            let height = (column_width - widest - GAP * em) * ASPECT;
+            let height = (column_width - widest - right) * ASPECT;
             let mut below: f64 = 0.0;
             for i in row * columns..((row + 1) * columns).min(count) {
                 let column = i % columns;
                 let from = GAP * em + column as f64 * column_width;
-                let width = column_width - left[column] - GAP * em;
+                let width = column_width - left[column] - right;
                 axes[i].frame = Frame { left: from + left[column], top, width, height };
                 let lowest = i + columns >= count;
                 below = below.max(if lowest { axes[i].label_height() + 1.5 * em } else { 0.4 * em });
@@ -167,8 +170,8 @@ impl Chart {
         let (mut x, mut y) = (left, 0.9 * em);
         let mut entries = Vec::new();
         for (sample, text) in &self.legend {
-            let text = letters.shortened(area, text, right - left - SAMPLE * em)?;
-            let width = SAMPLE * em + letters.width(area, &text)?;
+            let text = letters.shortened(area, text, right - left - sample.width() * em)?;
+            let width = sample.width() * em + letters.width(area, &text)?;
             if x > left && x + width > right {
                 (x, y) = (left, y + 1.4 * em);
             }
@@ -188,6 +191,7 @@ impl Chart {
                 Sample::Line(colour) => line(area, path, em, PALETTE[colour % PALETTE.len()], false)?,
                 Sample::Dashed => line(area, path, em, INK, true)?,
                 Sample::Dot => dot(area, (units((x + end) / 2.0), units(*y)), em, INK)?,
+                Sample::None => (),
                 Sample::Bands => {
                     for (colour, half) in BANDS.iter().zip([0.45, 0.2]) {
                         let corners = [(units(*x), units(y - half * em)), (units(end), units(y + half * em))];
@@ -195,7 +199,7 @@ impl Chart {
                     }
                 }
             }
-            letters.write(area, text, (x + SAMPLE * em, *y), HPos::Left)?;
+            letters.write(area, text, (x + sample.width() * em, *y), HPos::Left)?;
         }
         Ok(())
     }
@@ -203,6 +207,7 @@ impl Chart {
     fn draw_panel(&self, area: &Area<'_>, i: usize, axes: &Axes, lowest: bool) -> Result<(), Error> {
         let (panel, em) = (&self.panels[i], axes.em);
         let Frame { left, top, width, height } = axes.frame;
+        axes.draw_guides(area)?;
         for band in &panel.bands {
             let colour = BANDS[usize::from(band.inner)];
             let interrupted = |(x, low, high): &(f64, f64, f64)| ![x, low, high].iter().all(|v| v.is_finite());
@@ -217,7 +222,6 @@ impl Chart {
                 }
             }
         }
-        axes.draw_guides(area)?;
         for curve in &panel.curves {
             let places: Vec<_> = curve.points.iter().map(|(x, y)| axes.at(*x, *y)).collect();
             let colour = PALETTE[curve.colour % PALETTE.len()];
@@ -240,6 +244,13 @@ impl Chart {
             letters.write(area, &name, (left + width / 2.0, y), HPos::Center)?;
         }
         Ok(())
+    }
+}
+
+impl Sample {
+    /// Its width, in units of the letters' size.
+    fn width(self) -> f64 {
+        if self == Sample::None { 0.0 } else { SAMPLE }
     }
 }
 
@@ -267,5 +278,58 @@ impl Layout {
     /// Whether there is no panel below this one.
     fn lowest(&self, panel: usize) -> bool {
         panel + self.columns >= self.axes.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Left end, right end and height of each text, in pixels; letters are taken to be as wide as they get on the mean.
+    fn texts(svg: &str) -> Vec<(f64, f64, f64)> {
+        let texts = svg.split("<text").skip(1).map(|text| {
+            let number = |name: &str| {
+                let (_, rest) = text.split_once(&format!("{name}=\"")).unwrap();
+                rest.split_once('"').unwrap().0.parse::<f64>().unwrap() / 10.0
+            };
+            let letters = text.split_once('>').unwrap().1.split_once("</text>").unwrap().0.trim();
+            let width = 0.53 * number("font-size") * letters.chars().count() as f64;
+            let x = number(" x");
+            let left = match text {
+                _ if text.contains("\"middle\"") => x - width / 2.0,
+                _ if text.contains("\"end\"") => x - width,
+                _ => x,
+            };
+            (left, left + width, number(" y"))
+        });
+        texts.collect()
+    }
+
+    #[test]
+    fn no_chart_is_too_strange() {
+        let shared = Shared { name: "threshold".into(), unit: "kg m-2 s-1".into(), logarithmic: false };
+        for values in [[1e-9, 2e-9, 5e-9], [-1e300, 0.0, 1e300], [f64::NAN; 3], [7.0; 3], [1e5, f64::INFINITY, 2e5]] {
+            for (count, logarithmic) in [(1, false), (2, true), (3, false), (6, true)] {
+                let points = [1e-3, 1.0, 1e3].into_iter().zip(values).collect();
+                let curve = Curve { points, colour: 9, dashed: count == 3, marked: vec![0, 7] };
+                let band = Band { ends: vec![(1e-3, -1.0, values[0]), (1.0, values[1], f64::NAN)], inner: true };
+                let name =
+                    "a name that is far too long for the width of a panel or a chart, however wide ".repeat(count);
+                let panel = Panel { name: name.clone(), unit: "rad/sr".into(), bands: vec![band], curves: vec![curve] };
+                let samples = [Sample::Line(3), Sample::Dashed, Sample::Bands, Sample::Dot, Sample::None];
+                let legend = samples.into_iter().flat_map(|s| [(s, "short".to_owned()), (s, name.clone())]).collect();
+                let shared = Shared { logarithmic, ..shared.clone() };
+                let drawing = Chart { shared, panels: vec![panel; count], legend }.draw().unwrap();
+                let svg = drawing.svg();
+                assert!(!svg.contains("NaN") && !svg.contains("inf"));
+                let (_, height) = svg.split_once("height=\"").unwrap();
+                let height: f64 = height.split_once('"').unwrap().0.parse().unwrap();
+                for (left, right, y) in texts(svg) {
+                    let across = left > -0.02 * f64::from(WIDTH) && right < 1.02 * f64::from(WIDTH);
+                    assert!(across && y > 0.0 && y < height, "{count} panels of {values:?}: {left} to {right}, {y}");
+                }
+            }
+        }
+        assert!(matches!(Chart::default().draw(), Err(Error::NoPanels)));
     }
 }

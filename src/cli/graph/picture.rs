@@ -1,5 +1,7 @@
 //! The picture of a graph: a panel for each measure, curves of all maps, bands of the ensemble.
 
+use longan::Body;
+use longan::picture::axes::BLACK;
 use longan::picture::chart::{Band, Chart, Curve, Panel, Sample, Shared};
 
 use super::ensemble::{Ensemble, percentile, quantile};
@@ -10,6 +12,9 @@ const BANDS: [f64; 2] = [0.025, 0.16];
 
 /// Ratios of successive thresholds that differ by no more than this share are the same.
 const EVEN: f64 = 1e-9;
+
+/// Points of a smooth curve from one threshold to the next.
+const FINER: usize = 8;
 
 /// The bytes of the picture.
 pub(super) fn draw(
@@ -44,8 +49,16 @@ fn chart(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> Chart {
             legend.push((Sample::Dot, "outside 95 %".to_owned()));
         }
     }
+    if plan.analysis.body == Body::Below {
+        legend.push((Sample::None, "body below the threshold".to_owned()));
+    }
+    if let Some([longitude, latitude, radius]) = plan.region.map(|region| region.degrees()) {
+        let place = format!("within {radius}° of longitude {longitude}°, latitude {latitude}°");
+        // A true minus sign, as on the axes.
+        legend.push((Sample::None, place.replace('-', "−")));
+    }
     let shared = Shared {
-        name: format!("threshold{}", if plan.body() == "below" { ", body below" } else { "" }),
+        name: "threshold".to_owned(),
         unit: unit.to_owned(),
         logarithmic: !plan.in_sigma() && evenly_in_logarithm(plan.analysis.thresholds.values()),
     };
@@ -82,15 +95,10 @@ fn panel(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>, q: usize) ->
         }));
     }
     for (colour, curves) in data.iter().enumerate() {
-        let expected: Vec<(f64, f64)> =
-            curves.values[q].iter().enumerate().filter_map(|(t, v)| Some((x(curves, t), v.gaussian?))).collect();
-        panel.curves.push(Curve { points: expected, colour, dashed: true, marked: Vec::new() });
-    }
-    for (colour, curves) in data.iter().enumerate() {
         let values = &curves.values[q];
         let outside = |t: &usize| {
             let percent = ensemble.map_or(f64::NAN, |ensemble| percentile(ensemble.at(q, *t), values[*t].value));
-            percent < 100.0 * BANDS[0] || percent > 100.0 * (1.0 - BANDS[0])
+            (percent - 50.0).abs() > 100.0 * (0.5 - BANDS[0])
         };
         let points = thresholds.clone().map(|t| (x(curves, t), values[t].value)).collect();
         panel.curves.push(Curve {
@@ -99,6 +107,33 @@ fn panel(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>, q: usize) ->
             dashed: false,
             marked: thresholds.clone().filter(outside).collect(),
         });
+    }
+    if let Kind::Density(density) = &quantity.kind {
+        for (colour, curves) in data.iter().enumerate() {
+            let Some(gaussian) = &curves.gaussian else { continue };
+            let expected =
+                |(x, threshold): (f64, f64)| (x, (density.of)(&gaussian.per_area(threshold, plan.analysis.body)));
+            let points = thresholds.clone().flat_map(|t| {
+                let next = (t + 1).min(thresholds.end - 1);
+                let steps = if t < next { FINER } else { 1 };
+                (0..steps).map(move |i| (t, next, i as f64 / FINER as f64))
+            });
+            let between = |a: f64, b: f64, share: f64| a + (b - a) * share;
+            let points = points.map(|(t, next, share)| {
+                (
+                    between(x(curves, t), x(curves, next), share),
+                    between(curves.thresholds[t], curves.thresholds[next], share),
+                )
+            });
+            // One alone stands out in black.
+            let colour = if data.len() == 1 { BLACK } else { colour };
+            panel.curves.push(Curve {
+                points: points.map(expected).collect(),
+                colour,
+                dashed: true,
+                marked: Vec::new(),
+            });
+        }
     }
     panel
 }
