@@ -45,11 +45,12 @@ use scatter::{At, Scatter};
 #[command(mut_args(|arg| if WITHOUT_WORK.contains(&arg.get_id().as_str()) { arg } else { arg.requires("work") }))]
 #[command(after_help = "\
 Examples:
-  longan compare sky_evq.fits maps/*.fits -o deviation.fits
-  longan compare sky_evq.fits maps/*.fits -o deviation.nc --smooth 10 --regions 20 --level 2.5
-  longan compare sky_evq.fits maps/*.fits -o deviation.fits --format json > report.json
-  longan compare sky_evq.fits maps/*.fits -o deviation.fits --scatter 264,-17 evq,rank4-mid
-  longan compare sky.fits sims/*.fits -o deviation.fits --work work/ --measure evq --window 6 --mask mask.fits
+  longan map sky.fits sims/*.fits -o maps/ --measure evq,rank4-mid
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.fits
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.nc --smooth 10 --regions 20 --level 2.5
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.fits --format json > report.json
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.fits --scatter 264,-17 evq,rank4-mid
+  longan compare sky.fits sims/*.fits -o deviation.fits --work work/ --window 10 --mask mask.fits
 
 Inputs are Minkowski maps of longan, all made in the same way, of any ordering; their masks may differ. With --work they
 are maps of any kind, of which Minkowski maps are made first, by the options of `longan map`, in that folder; those that
@@ -247,7 +248,7 @@ impl Arguments {
         if let [only] = &self.simulations[..] {
             return Err(misused(
                 "compare",
-                format!("'{}' is the only simulation, and there must be at least two for a scatter", shown(only)),
+                format!("'{}' is the only simulation, and a standard deviation needs at least two", shown(only)),
             ));
         }
         let scatter = match &self.scatter[..] {

@@ -204,11 +204,14 @@ fn what_does_not_go_together_is_named() {
     let folder = with_maps(2, MEASURES);
     for (options, parts) in [
         ("--window 12 --nside-out 4", &["Nside 8", "Nside 4"][..]),
-        ("--window 10 --nside-out 8", &["window of 12 degrees,", "window of 10 degrees;"]),
+        ("--window 10 --nside-out 8", &["window of 12 degrees", "window of 10 degrees"]),
         ("--window 12 --nside-out 8 --body below", &["above", "below"]),
         ("--window 12 --nside-out 8 --weight curvature", &["length", "curvature"]),
         ("--window 12 --nside-out 8 --thresholds -3:3:7 --threshold-unit sigma", &["13", "7"]),
-        ("--window 12 --nside-out 8 --thresholds -3:2:13 --threshold-unit sigma", &["-2.5, -2,", "-2.583333", "sigma"]),
+        (
+            "--window 12 --nside-out 8 --thresholds -3:2:13 --threshold-unit sigma",
+            &["thresholds -3, -2.5, -2,", "-2.583333", "sigma"],
+        ),
         ("--window 12 --nside-out 8 --thresholds -3:3:13", &["unit of thresholds sigma", "unit of thresholds value"]),
     ] {
         folder.done(&format!("map raw/2.fits -o other.fits --overwrite --measure evq {options}"));
