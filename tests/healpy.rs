@@ -202,6 +202,38 @@ assert count > 80, count
 }
 
 #[test]
+fn healpy_opens_deviations() {
+    let Some(python) = interpreter() else { return };
+    let folder = Folder::new();
+    for seed in 0..4 {
+        folder.done(&format!("simulate waves -o {seed}.fits --nside 16 --correlation 15 --seed {seed}"));
+    }
+    folder.done("map 0.fits 1.fits 2.fits 3.fits -o maps --measure evq,rank4-mid --window 12");
+    let words = "compare maps/0.fits maps/1.fits maps/2.fits maps/3.fits";
+    folder.done(&format!("{words} -o deviation.fits --smooth 10 --ordering nested"));
+    run(
+        python,
+        &folder,
+        r#"
+names = ['MEAN', 'STD', 'SIGMA', 'LOCAL_PERCENTILE', 'GLOBAL_PERCENTILE', 'COUNT']
+maps, header = hp.read_map('deviation.fits', field=None, dtype=None, h=True)
+header = dict(header)
+assert maps.shape == (12, 3072), maps.shape
+columns = [header[f'TTYPE{i}'] for i in range(1, 13)]
+assert columns == [f'{measure}_{name}' for measure in ('EVQ', 'RANK4_MID') for name in names], columns
+assert header['NSIMS'] == 3 and header['SMOOTH'] == 10 and header['TUNIT8'] == 'rad', header
+mean, std, sigma, local, world, count = maps[:6]
+assert (count == 3).all() and set(np.round(local)) <= {0, 33, 67, 100}
+assert (0 <= world).all() and (world <= 100).all() and abs(world.mean() - 50) < 10, world.mean()
+data = [hp.read_map(f'maps/{i}.fits', dtype=None) for i in range(4)]
+smooth = [hp.smoothing(m, fwhm=np.radians(10), iter=10) for m in data]
+for found, expected in [(mean, np.mean(smooth[1:], axis=0)), (std, np.std(smooth[1:], axis=0, ddof=1))]:
+    assert abs(found - expected).max() < 1e-2 * expected.max(), abs(found - expected).max()
+"#,
+    );
+}
+
+#[test]
 fn smoothing_agrees_with_healpy() {
     let Some(python) = interpreter() else { return };
     let folder = Folder::new();

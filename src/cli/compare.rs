@@ -327,20 +327,20 @@ impl Arguments {
         if !asked.is_empty() {
             return Ok(columns);
         }
+        let mut left_out = Vec::new();
         for column in &data.columns {
             match lacking(&column.name) {
-                Some(file) => self.running.warn(format_args!(
-                    "{} is left out: {} has only {}",
-                    column.name,
-                    shown(&file.path),
-                    file.listed()
-                )),
-                None if column.is_direction() => self.running.warn(format_args!(
-                    "{} is left out: it is an angle, of which there is no mean or order",
-                    column.name
-                )),
+                Some(file) => {
+                    left_out.push(format!("{}: {} has only {}", column.name, shown(&file.path), file.listed()));
+                }
+                None if column.is_direction() => {
+                    left_out.push(format!("{}: it is an angle, of which there is no mean or order", column.name));
+                }
                 None => columns.push(column.clone()),
             }
+        }
+        if !columns.is_empty() {
+            left_out.iter().for_each(|what| self.running.warn(format_args!("left out is {what}")));
         }
         if columns.is_empty() {
             let other = data.columns.iter().find_map(|column| lacking(&column.name));

@@ -268,7 +268,7 @@ fn what_cannot_be_compared_is_refused() {
     }
     // What is left of it is compared, and the rest is named.
     let ran = folder.run(&format!("compare data.fits {sims} -o out.fits"));
-    assert!(ran.code == Some(0) && ran.err.contains("EVQ_DIRECTION is left out: it is an angle"), "{ran:?}");
+    assert!(ran.code == Some(0) && ran.err.contains("left out is EVQ_DIRECTION: it is an angle"), "{ran:?}");
     let ran =
         folder.run(&format!("compare data.fits {sims} data.fits sims/1.fits -o out.fits --overwrite --measure evq"));
     assert!(ran.code == Some(0) && ran.err.contains("data.fits: the data is among the simulations"), "{ran:?}");
