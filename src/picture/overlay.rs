@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use longan_formats::{Healpix, UNSEEN, is_bad};
-use plotters::style::{BLACK, Color, WHITE};
+use plotters::style::{Color, WHITE};
 
 use super::Error;
 use super::coastlines::coastlines;
@@ -101,9 +101,7 @@ impl Overlays {
     pub(super) fn draw(&self, pen: &Pen<'_, '_>, place: &Place<'_>, size: f64) -> Result<(), Error> {
         if self.coastlines {
             let lines: Vec<_> = coastlines().flat_map(|line| seen(place, line)).collect();
-            for line in &lines {
-                pen.line(line, BLACK.mix(0.75), size / 18.0)?;
-            }
+            on_any_colour(pen, &lines, size / 22.0)?;
         }
         let contours: Vec<_> = self.lines.iter().flat_map(|line| seen(place, line.iter().copied())).collect();
         on_any_colour(pen, &contours, size / 14.0)?;

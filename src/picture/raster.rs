@@ -20,7 +20,7 @@ const FINE_SUPERSAMPLING: usize = 2;
 const ROWS: usize = 16;
 
 /// Values that the colour range is found from, about.
-const SEEN: usize = 1 << 20;
+const SEEN: usize = 1 << 18;
 
 /// A map's grid and its values in RING order.
 #[derive(Clone, Copy)]
@@ -61,7 +61,9 @@ pub(super) fn coloured(field: Field<'_>, place: &Place<'_>, scale: &Scale) -> Im
         }
         sum.map(|sum| ((sum + samples / 2) / samples) as u8)
     };
-    let corners = |y: usize| -> Vec<_> { (0..=width).map(|x| pixel_at(x as f64, y as f64)).collect() };
+    // Fine pixels hardly ever fill one of the image, so nothing is asked of its corners.
+    let corner = |x: usize, y: usize| if is_fine { None } else { pixel_at(x as f64, y as f64) };
+    let corners = |y: usize| -> Vec<_> { (0..=width).map(|x| corner(x, y)).collect() };
     image.rgb.par_chunks_mut(3 * width * ROWS).enumerate().for_each(|(block, rows)| {
         let mut above = corners(block * ROWS);
         for (y, row) in (block * ROWS..).zip(rows.chunks_mut(3 * width)) {

@@ -1,7 +1,7 @@
 //! The sphere as it is seen: turned to its centre, mirrored where east lies to the left, and projected.
 //!
 //! Lines on the sphere become lines of the plane here, ended and begun anew where the projection cuts them. Points are
-//! unit vectors. Pixels are left to the [`panel`](super::panel).
+//! unit vectors. Pixels are left to the panel.
 
 use std::sync::Arc;
 

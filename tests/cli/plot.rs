@@ -141,9 +141,10 @@ fn contours_are_of_this_map_or_of_another() {
     let lines = |words: &str| svg(&folder, words).matches("<polyline").count();
     let none = lines("sky.fits");
     assert!(lines("sky.fits --contour-threshold 0") > none);
-    // Of seven bodies each a line and its seam.
+    // Of eight bodies each a line and its seam.
+    assert!(folder.done("totals bodies.fits --thresholds 0.5").trim_end().ends_with(" 8"));
     let bodies = lines("sky.fits --contour bodies.fits --contour-threshold 0.5");
-    assert_eq!(bodies, none + 14);
+    assert_eq!(bodies, none + 16);
     // Where nothing is there, there is no line.
     assert_eq!(lines("sky.fits --contour-threshold 1e6"), none);
     folder.misused("plot sky.fits -o a.png --contour bodies.fits", &["--contour-threshold"]);
