@@ -9,11 +9,12 @@ use longan_formats::{Healpix, Map};
 use longan_measures::{Measure, MeasureError, Window};
 
 use crate::contour::{Body, Field};
-use crate::moments::{Selection, Weight};
+use crate::moments::{Layout, Selection, Weight};
+use crate::region::Region;
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
-use crate::totals::{Totals, totals};
-use crate::window::{Moments, MovingWindows, Summation, Ways, Windows};
+use crate::totals::{Regional, Totals, totals, totals_within};
+use crate::window::{self, Moments, MovingWindows, Summation, Ways, Windows};
 
 /// What thresholds are counted in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -172,6 +173,15 @@ pub struct MinkowskiMaps {
     pub ways: Ways,
 }
 
+impl MinkowskiMaps {
+    /// The mean of a measure over some pixels of the grid where it is defined, and their number; NaN where there are none.
+    pub fn mean(&self, measure: usize, pixels: &[bool]) -> (f64, usize) {
+        let defined = self.values[measure].iter().zip(pixels).filter(|(value, within)| **within && !value.is_nan());
+        let (sum, windows) = defined.fold((0.0, 0), |(sum, n), (value, _)| (sum + value, n + 1));
+        (sum / windows as f64, windows)
+    }
+}
+
 impl Analysis {
     /// Checks all that can be checked without the field's values, before a long computation.
     ///
@@ -200,6 +210,27 @@ impl Analysis {
             return Err(AnalysisError::PixelWindow { map: map.nside(), output: nside });
         }
         Ok(output)
+    }
+
+    /// About how many bytes the Minkowski maps of a field take at most while they are made, beside the field itself.
+    ///
+    /// # Errors
+    /// See [`check`](Self::check), and where measures need another weight.
+    pub fn memory(
+        &self,
+        map: Healpix,
+        measures: &[impl AsRef<dyn Measure>],
+        sequence: bool,
+    ) -> Result<usize, AnalysisError> {
+        let output = self.check(map)?;
+        let thresholds = self.thresholds.values().len();
+        let selection = Selection { by_threshold: sequence, ..self.selection(measures)? };
+        let rows = Layout::new(&selection, thresholds, true).rows;
+        let tables = if sequence { thresholds } else { 1 };
+        let windows = self.windows.iter().map(|degrees| window::memory(map, output, degrees.to_radians(), rows));
+        let columns = tables * self.windows.len() * measures.len() * size_of::<f64>();
+        let maps = output.pixels().saturating_mul(columns);
+        Ok(windows.fold(maps.saturating_add(window::band_memory(map, rows)), usize::saturating_add))
     }
 
     /// The thresholds in the map's unit, and the statistics of the map that they may be counted from.
@@ -236,9 +267,7 @@ impl Analysis {
         measures: &[impl AsRef<dyn Measure> + Sync],
         progress: impl FnMut(f64),
     ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
-        let grid = self.check(map.grid())?;
-        let (thresholds, of_map) = self.thresholds_of(map)?;
-        self.at(thresholds, of_map, map, grid, measures, progress)
+        self.maps(map, measures, false, progress)
     }
 
     /// The same for every threshold by itself: for each window the thresholds in ascending order.
@@ -249,35 +278,28 @@ impl Analysis {
         &self,
         map: &Map,
         measures: &[impl AsRef<dyn Measure> + Sync],
-        mut progress: impl FnMut(f64),
+        progress: impl FnMut(f64),
+    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
+        self.maps(map, measures, true, progress)
+    }
+
+    fn maps(
+        &self,
+        map: &Map,
+        measures: &[impl AsRef<dyn Measure> + Sync],
+        by_threshold: bool,
+        progress: impl FnMut(f64),
     ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
         let grid = self.check(map.grid())?;
         let (thresholds, of_map) = self.thresholds_of(map)?;
-        let count = thresholds.values().len() as f64;
-        let mut all = Vec::new();
-        for (i, &threshold) in thresholds.values().iter().enumerate() {
-            let alone = Thresholds::new(vec![threshold])?;
-            let progress = |share| progress((i as f64 + share) / count);
-            all.extend(self.at(alone, of_map, map, grid, measures, progress)?);
-        }
-        let place = |maps: &MinkowskiMaps| self.windows.iter().position(|w| *w == maps.window);
-        all.sort_by_key(place);
-        Ok(all)
-    }
-
-    fn at(
-        &self,
-        thresholds: Thresholds,
-        of_map: Statistics,
-        map: &Map,
-        grid: Healpix,
-        measures: &[impl AsRef<dyn Measure> + Sync],
-        progress: impl FnMut(f64),
-    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
         if measures.is_empty() {
             return Err(AnalysisError::NoMeasure);
         }
-        let selection = self.selection(measures)?;
+        let selection = Selection { by_threshold, ..self.selection(measures)? };
+        let of_each = match by_threshold {
+            true => thresholds.values().iter().map(|&t| Thresholds::new(vec![t])).collect::<Result<_, _>>()?,
+            false => vec![thresholds.clone()],
+        };
         let evaluate = |batch: &[Moments], values: &mut [f64]| {
             let masked = |m: &Moments| m.masked_fraction >= 1.0 || m.masked_fraction > self.max_masked;
             let unmasked = batch.iter().enumerate().filter(|(_, moments)| !masked(moments));
@@ -301,8 +323,13 @@ impl Analysis {
             summation: self.summation,
         };
         let all = windows.visit_batches(measures.len(), evaluate, progress)?;
-        let maps = all.into_iter().zip(&self.windows).map(|(Windows { columns: values, ways }, &window)| {
-            MinkowskiMaps { grid, window, thresholds: thresholds.clone(), of_map, values, ways }
+        let maps = all.into_iter().zip(&self.windows).flat_map(|(Windows { columns, ways }, &window)| {
+            let mut columns = columns.into_iter();
+            let maps = of_each.iter().map(|thresholds| {
+                let values = columns.by_ref().take(measures.len()).collect();
+                MinkowskiMaps { grid, window, thresholds: thresholds.clone(), of_map, values, ways }
+            });
+            maps.collect::<Vec<_>>()
         });
         Ok(maps.collect())
     }
@@ -316,6 +343,16 @@ impl Analysis {
         let (thresholds, _) = self.thresholds_of(map)?;
         let (totals, masked) = totals(&Field::new(map.grid(), map.values(), &thresholds, self.body));
         Ok((thresholds, totals, masked))
+    }
+
+    /// The same over a region, or over the sphere.
+    ///
+    /// # Errors
+    /// See [`thresholds_of`](Self::thresholds_of).
+    pub fn totals_within(&self, map: &Map, region: Option<&Region>) -> Result<(Thresholds, Regional), AnalysisError> {
+        let (thresholds, _) = self.thresholds_of(map)?;
+        let regional = totals_within(&Field::new(map.grid(), map.values(), &thresholds, self.body), region);
+        Ok((thresholds, regional))
     }
 
     /// A window as measures see it.

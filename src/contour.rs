@@ -145,6 +145,16 @@ impl<'a> Segment<'a> {
         angles::from_sin_cos(self.sin, self.from.point.at.dot(self.to.point.at))
     }
 
+    /// Where it begins and ends, as unit vectors.
+    pub fn ends(&self) -> [DVec3; 2] {
+        [self.from.point.at, self.to.point.at]
+    }
+
+    /// The edges that it begins and ends on, each numbered by its first corner.
+    pub fn edges(&self) -> [usize; 2] {
+        [self.from.edge, self.to.edge]
+    }
+
     /// Direction of the normal at each corner, after transport there from the segment's midpoint: e^{iϕ} with ϕ
     /// counted from south towards east.
     #[inline(always)]

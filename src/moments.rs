@@ -1,8 +1,8 @@
 //! Moments of body and contour, gathered at the pixels.
 //!
 //! A cell's moments are shared equally among its corners, each share transported from the segment's midpoint to that
-//! pixel's centre: ψ_s = Σ L e^{isϕ} with ϕ the angle of the contour's normal there. All thresholds are summed;
-//! dividing by their number, and summing pixels to windows, is left to [`crate::window`].
+//! pixel's centre: ψ_s = Σ L e^{isϕ} with ϕ the angle of the contour's normal there. All thresholds are summed, or each
+//! is kept by itself; dividing by their number, and summing pixels to windows, is left to [`crate::window`].
 
 use std::ops::Range;
 
@@ -25,32 +25,42 @@ pub struct Selection {
     pub ranks: Vec<u32>,
     /// The weight of the moments ψ_s.
     pub weight: Weight,
+    /// Each threshold by itself instead of their sum.
+    pub by_threshold: bool,
 }
 
 /// Where each selected quantity stands among the rows of a ring.
+///
+/// The shares that are masked come first, then for each group of thresholds the plain rows, W0 to W2, then for each group
+/// those of ψ_s. A group is one threshold where these are kept by themselves, else there is one group of them all.
 #[derive(Clone, Debug)]
 pub struct Layout {
     /// Cell shares that are masked, of the four that each pixel has. Absent where nothing is masked.
     pub masked: Option<usize>,
-    /// W0.
+    /// W0 of the first group; [`plain`](Self::plain) rows further on that of the next, as for the following.
     pub area: Option<usize>,
     /// W1.
     pub length: Option<usize>,
     /// W2.
     pub curvature: Option<usize>,
-    /// Re ψ_s of the first rank; Im ψ_s is the next row, then come the other ranks.
+    /// Plain rows of a group.
+    pub plain: usize,
+    /// Re ψ_s of the first group's first rank; Im ψ_s is the next row, then come the other ranks, then other groups.
     pub first_rank: usize,
     /// Ranks s ≥ 1, ascending.
     pub ranks: Vec<u32>,
     /// Weight of the moments.
     pub weight: Weight,
+    /// Number of groups.
+    pub groups: usize,
     /// Number of rows.
     pub rows: usize,
 }
 
 impl Layout {
-    /// Rows for this selection.
-    pub fn new(selection: &Selection, masked: bool) -> Self {
+    /// Rows for this selection and so many thresholds.
+    pub fn new(selection: &Selection, thresholds: usize, masked: bool) -> Self {
+        let groups = if selection.by_threshold { thresholds } else { 1 };
         let mut rows = 0;
         let mut row = |wanted: bool| {
             rows += usize::from(wanted);
@@ -58,16 +68,42 @@ impl Layout {
         };
         let (masked, area) = (row(masked), row(selection.area));
         let (length, curvature) = (row(selection.length), row(selection.curvature));
+        let plain = rows - usize::from(masked.is_some());
+        let first_rank = rows + (groups - 1) * plain;
         Layout {
             masked,
             area,
             length,
             curvature,
-            first_rank: rows,
+            plain,
+            first_rank,
             ranks: selection.ranks.clone(),
             weight: selection.weight,
-            rows: rows + 2 * selection.ranks.len(),
+            groups,
+            rows: first_rank + groups * 2 * selection.ranks.len(),
         }
+    }
+
+    /// The first row of each ψ_s, with the place of its rank: all ranks of the first group, then of the next.
+    pub(crate) fn psi(&self) -> impl Iterator<Item = (usize, usize)> {
+        let ranks = self.ranks.len();
+        (0..self.groups * ranks).map(move |i| (self.first_rank + 2 * i, i % ranks))
+    }
+
+    /// The plain rows of some groups, and their rows of ψ_s.
+    #[inline(always)]
+    fn rows_of(&self, groups: &Range<usize>) -> [Range<usize>; 2] {
+        let (first, step) = (self.first_rank - self.groups * self.plain, 2 * self.ranks.len());
+        [
+            first + groups.start * self.plain..first + groups.end * self.plain,
+            self.first_rank + groups.start * step..self.first_rank + groups.end * step,
+        ]
+    }
+
+    /// The group of a threshold.
+    #[inline(always)]
+    fn group(&self, threshold: usize) -> usize {
+        if self.groups == 1 { 0 } else { threshold }
     }
 }
 
@@ -109,6 +145,7 @@ pub fn at_pixels(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Vec
         rings: moments.collect(),
         same_ring: Vec::new(),
         cell: vec![[0.0; 4]; layout.rows],
+        touched: 0..0,
     };
     // A pixel's cells lie on its own ring and the two beside it.
     march_into(field, rings.start - 1..rings.end + 1, &mut gather);
@@ -129,6 +166,8 @@ struct Gather<'a> {
     same_ring: Vec<f64>,
     /// The present cell's moments as seen from each of its corners, row by row.
     cell: Vec<[f64; 4]>,
+    /// Groups of thresholds between which all lie that have moments in the present cell.
+    touched: Range<usize>,
 }
 
 impl Gather<'_> {
@@ -145,7 +184,13 @@ impl Gather<'_> {
     }
 
     #[inline(always)]
-    fn add(&mut self, segment: &Segment<'_>) {
+    fn touch(&mut self, groups: Range<usize>) {
+        let Range { start, end } = self.touched;
+        self.touched = if start == end { groups } else { start.min(groups.start)..end.max(groups.end) };
+    }
+
+    #[inline(always)]
+    fn add(&mut self, segment: &Segment<'_>, group: usize) {
         let layout = self.layout;
         let by_length = layout.weight == Weight::Length && !layout.ranks.is_empty();
         let by_turn = layout.weight == Weight::Curvature && !layout.ranks.is_empty();
@@ -154,6 +199,7 @@ impl Gather<'_> {
         let cell = &mut self.cell;
         for (row, value) in [(layout.length, length), (layout.curvature, turn)] {
             if let Some(row) = row {
+                let row = row + group * layout.plain;
                 cell[row] = cell[row].map(|a| a + value);
             }
         }
@@ -162,7 +208,8 @@ impl Gather<'_> {
         }
         let weight = if by_length { length } else { turn };
         let mut powers = Powers::new(segment.directions());
-        for (rows, &rank) in cell[layout.first_rank..].chunks_exact_mut(2).zip(&layout.ranks) {
+        let first = layout.first_rank + 2 * layout.ranks.len() * group;
+        for (rows, &rank) in cell[first..].chunks_exact_mut(2).zip(&layout.ranks) {
             let power = powers.raise(rank);
             for c in 0..4 {
                 rows[0][c] += weight * power.re[c];
@@ -187,45 +234,59 @@ impl Sink for Gather<'_> {
     }
 
     fn inside(&mut self, cell: Cell<'_>, thresholds: Range<usize>, area: f64) {
-        self.area(cell, thresholds.start, area * thresholds.len() as f64);
+        if self.layout.groups == 1 {
+            self.area(cell, thresholds.start, area * thresholds.len() as f64);
+        } else {
+            thresholds.for_each(|threshold| self.area(cell, threshold, area));
+        }
     }
 
-    fn area(&mut self, _: Cell<'_>, _: usize, area: f64) {
+    fn area(&mut self, _: Cell<'_>, threshold: usize, area: f64) {
+        let group = self.layout.group(threshold);
         if let Some(row) = self.layout.area {
-            self.cell[row].iter_mut().for_each(|a| *a += area);
+            self.cell[row + group * self.layout.plain].iter_mut().for_each(|a| *a += area);
+            self.touch(group..group + 1);
         }
     }
 
     #[inline(always)]
-    fn contour(&mut self, _: Cell<'_>, _: usize, segments: &[Segment<'_>]) {
+    fn contour(&mut self, _: Cell<'_>, threshold: usize, segments: &[Segment<'_>]) {
+        let group = self.layout.group(threshold);
+        self.touch(group..group + 1);
         let [one, other] = segments else {
             for segment in segments {
-                self.add(segment);
+                self.add(segment, group);
             }
             return;
         };
         // The two of a saddle are summed first: their order depends on how the cell is turned.
-        let so_far = std::mem::replace(&mut self.cell, vec![[0.0; 4]; self.layout.rows]);
-        self.add(one);
-        self.add(other);
-        for (row, so_far) in self.cell.iter_mut().zip(so_far) {
-            row.iter_mut().zip(so_far).for_each(|(a, b)| *a += b);
+        let rows = self.layout.rows_of(&(group..group + 1));
+        let so_far = rows.clone().map(|rows| self.cell[rows].to_vec());
+        rows.iter().for_each(|rows| self.cell[rows.clone()].fill([0.0; 4]));
+        self.add(one, group);
+        self.add(other, group);
+        for (rows, so_far) in rows.into_iter().zip(so_far) {
+            for (row, so_far) in self.cell[rows].iter_mut().zip(so_far) {
+                row.iter_mut().zip(so_far).for_each(|(a, b)| *a += b);
+            }
         }
     }
 
     #[inline(always)]
     fn cell_finished(&mut self, cell: Cell<'_>) {
         let part = 1.0 / cell.count as f64;
-        let moments = std::mem::take(&mut self.cell);
-        for (c, &pixel) in cell.pixels[..cell.count].iter().enumerate() {
-            if let Some((data, len)) = self.target(cell, pixel) {
-                for (row, moments) in moments.iter().enumerate() {
-                    data[row * len + pixel.column] += moments[c] * part;
+        let mut moments = std::mem::take(&mut self.cell);
+        for rows in self.layout.rows_of(&std::mem::take(&mut self.touched)) {
+            for (c, &pixel) in cell.pixels[..cell.count].iter().enumerate() {
+                if let Some((data, len)) = self.target(cell, pixel) {
+                    for (row, moments) in rows.clone().zip(&moments[rows.clone()]) {
+                        data[row * len + pixel.column] += moments[c] * part;
+                    }
                 }
             }
+            moments[rows].fill([0.0; 4]);
         }
         self.cell = moments;
-        self.cell.fill([0.0; 4]);
     }
 
     fn ring_finished(&mut self, ring: usize) {

@@ -7,10 +7,11 @@
 
 mod direct;
 mod prefix;
-mod reach;
+pub(crate) mod reach;
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
 use longan_formats::{Healpix, Ring};
@@ -22,8 +23,11 @@ use crate::moments::{self, Layout, RingMoments, SHARES, Selection, Weight};
 use prefix::Way;
 use reach::{OutputRing, Reached};
 
-/// Rings of input moments that are made at a time.
+/// Rings of input moments that are made at a time, and how few they become where many rows would take more than so
+/// many bytes.
 const BAND: usize = 128;
+const BAND_LEAST: usize = 16;
+const BAND_BYTES: usize = 1 << 28;
 
 /// Most output rings to a group.
 const GROUP: usize = 32;
@@ -37,7 +41,7 @@ const SMALLEST: usize = 2;
 /// Most windows that are visited together.
 const BATCH: usize = 256;
 
-/// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
+/// Moments of one window, the mean over the thresholds or those of one; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]
 pub struct Moments {
     /// Colatitude and longitude of the window's centre in radians.
@@ -92,7 +96,8 @@ pub struct Ways {
 /// Values of all windows of one radius.
 #[derive(Clone, Debug)]
 pub struct Windows {
-    /// What was visited, column by column, in RING order.
+    /// What was visited, column by column, in RING order; where thresholds are kept by themselves, all columns of the
+    /// first, then of the next.
     pub columns: Vec<Vec<f64>>,
     /// How it was summed.
     pub ways: Ways,
@@ -137,7 +142,8 @@ impl MovingWindows<'_> {
         }
     }
 
-    /// The same, with many windows at a time: `visit` fills `columns` numbers for the first, then for the next.
+    /// The same, with many windows at a time: `visit` fills `columns` numbers for the first, then for the next. Where
+    /// thresholds are kept by themselves, each window comes once for each threshold.
     ///
     /// # Errors
     /// The northernmost of `visit`, which ends the work.
@@ -152,11 +158,13 @@ impl MovingWindows<'_> {
     ) -> Result<Vec<Windows>, E> {
         let input = self.field.grid();
         assert!(!self.radii.contains(&0.0) || self.output == input, "a window of one pixel needs the input's grid");
-        let layout = Layout::new(self.selection, self.field.has_masked());
+        let layout = Layout::new(self.selection, self.field.thresholds(), self.field.has_masked());
         let mut sweeps: Vec<Sweep<'_>> =
             self.radii.iter().map(|&radius| Sweep::new(self, &layout, radius, columns)).collect();
-        for first in (1..=input.rings()).step_by(BAND) {
-            let band = Band::new(self.field, &layout, first..(first + BAND).min(input.rings() + 1));
+        let ring_bytes = 4 * input.nside() * layout.rows.max(1) * size_of::<f64>();
+        let rings = (BAND_BYTES / ring_bytes).clamp(BAND_LEAST, BAND);
+        for first in (1..=input.rings()).step_by(rings) {
+            let band = Band::new(self.field, &layout, first..(first + rings).min(input.rings() + 1));
             for sweep in &mut sweeps {
                 sweep.add(&band);
                 sweep.visit_finished(band.rings.end, &visit)?;
@@ -166,6 +174,21 @@ impl MovingWindows<'_> {
         }
         Ok(sweeps.into_iter().map(|sweep| sweep.windows).collect())
     }
+}
+
+/// About how many bytes the sums of one radius's windows take at most: those of the output rings that an input ring, a
+/// band of them and a group's rings beside it reach.
+pub(crate) fn memory(input: Healpix, output: Healpix, radius: f64, rows: usize) -> usize {
+    let band = BAND as f64 * PI / input.rings() as f64;
+    let group = (GROUP as f64 * PI / output.rings() as f64).min(radius);
+    // The widest zone is about the equator.
+    let share = (radius + group + band / 2.0).min(FRAC_PI_2).sin();
+    (share * output.pixels() as f64 * ((rows + 1) * size_of::<f64>()) as f64) as usize
+}
+
+/// About how many bytes the moments of a band of input rings take.
+pub(crate) fn band_memory(input: Healpix, rows: usize) -> usize {
+    BAND.min(input.rings()) * 4 * input.nside() * rows * size_of::<f64>()
 }
 
 /// The windows of one radius on their way over the field.
@@ -192,7 +215,7 @@ struct Group {
 
 impl<'a> Sweep<'a> {
     fn new(of: &'a MovingWindows<'a>, layout: &'a Layout, radius: f64, columns: usize) -> Self {
-        let columns = (0..columns).map(|_| Vec::with_capacity(of.output.pixels()));
+        let columns = (0..columns * layout.groups).map(|_| Vec::with_capacity(of.output.pixels()));
         let windows = Windows { columns: columns.collect(), ways: Ways::default() };
         let next = Some(OutputRing::new(of.field.grid(), of.output, 1, radius));
         Sweep { of, layout, radius, groups: VecDeque::new(), next, windows }
@@ -350,15 +373,18 @@ fn visited<E>(
     columns: usize,
     visit: impl Fn(&[Moments], &mut [f64]) -> Result<(), E>,
 ) -> Result<Vec<f64>, E> {
-    let mut out = vec![0.0; ring.in_quadrant * columns];
-    let mut batch = vec![Moments::default(); ring.in_quadrant.min(BATCH)];
+    // `columns` are those of all groups of thresholds.
+    let (groups, columns) = (layout.groups, columns / layout.groups);
+    let mut out = vec![0.0; ring.in_quadrant * groups * columns];
+    let mut batch = vec![Moments::default(); (ring.in_quadrant * groups).min(BATCH)];
     for (number, out) in out.chunks_mut(BATCH * columns).enumerate() {
         let batch = &mut batch[..out.len() / columns];
         for (i, moments) in batch.iter_mut().enumerate() {
-            let k = number * BATCH + i;
+            let k = (number * BATCH + i) / groups;
+            let group = (number * BATCH + i) % groups;
             let sum = |row: usize| sums.data[k * sums.rows + row];
-            let mean = |row: usize| sum(row) / thresholds as f64;
-            let selected = |row: Option<usize>| row.map_or(0.0, mean);
+            let mean = |row: usize| sum(row) / (thresholds / groups) as f64;
+            let selected = |row: Option<usize>| row.map_or(0.0, |row| mean(row + group * layout.plain));
             moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
             moments.masked_fraction = match (sums.pixels[k], layout.masked) {
                 (0, _) => 1.0,
@@ -369,7 +395,7 @@ fn visited<E>(
             moments.length = selected(layout.length);
             moments.curvature = selected(layout.curvature);
             moments.psi.clear();
-            let rows = (layout.first_rank..layout.rows).step_by(2);
+            let rows = layout.psi().map(|(row, _)| row).skip(group * layout.ranks.len()).take(layout.ranks.len());
             // |ψ_s| ≤ W1, which the error of prefix sums must not break where a contour is nearly straight.
             let most =
                 if layout.weight == Weight::Length && layout.length.is_some() { moments.length } else { f64::INFINITY };

@@ -10,16 +10,24 @@ mod bytes;
 #[allow(dead_code)]
 mod compile;
 
+/// Data against simulations.
+mod compare;
 /// Every family of files, from end to end.
 mod families;
 /// Measures as formulas.
 mod formulas;
+/// `longan graph`.
+mod graph;
 /// Fields on grids of latitude and longitude, made by hand.
 mod gridded;
+/// Many maps at a time, in parts, and in spite of kills.
+mod many_maps;
 /// `longan map` on one input.
 mod map;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
 mod names_and_streams;
+/// `longan plot`.
+mod plot;
 /// Measures from libraries, and `longan plugin`.
 mod plugins;
 /// What is refused, and in which words.

@@ -4,7 +4,10 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 
-use longan::formats::{Card, CardValue, Column, CoordinateSystem, Extension, HealpixFile, Ordering, write_healpix};
+use longan::formats::{
+    Card, CardValue, Column, CoordinateSystem, Extension, Healpix, HealpixFile, Ordering, write_healpix,
+};
+use longan::smoothing::Smoothing;
 
 use super::cli::Folder;
 use super::{difference, masked, noise, skipped};
@@ -196,4 +199,67 @@ assert count > 80, count
         }
     }
     assert!(outputs > 80, "{outputs}");
+}
+
+#[test]
+fn healpy_opens_deviations() {
+    let Some(python) = interpreter() else { return };
+    let folder = Folder::new();
+    for seed in 0..4 {
+        folder.done(&format!("simulate waves -o {seed}.fits --nside 16 --correlation 15 --seed {seed}"));
+    }
+    folder.done("map 0.fits 1.fits 2.fits 3.fits -o maps --measure evq,rank4-mid --window 12");
+    let words = "compare maps/0.fits maps/1.fits maps/2.fits maps/3.fits";
+    folder.done(&format!("{words} -o deviation.fits --smooth 10 --ordering nested"));
+    run(
+        python,
+        &folder,
+        r#"
+names = ['MEAN', 'STD', 'SIGMA', 'LOCAL_PERCENTILE', 'GLOBAL_PERCENTILE', 'COUNT']
+maps, header = hp.read_map('deviation.fits', field=None, dtype=None, h=True)
+header = dict(header)
+assert maps.shape == (12, 3072), maps.shape
+columns = [header[f'TTYPE{i}'] for i in range(1, 13)]
+assert columns == [f'{measure}_{name}' for measure in ('EVQ', 'RANK4_MID') for name in names], columns
+assert header['NSIMS'] == 3 and header['SMOOTH'] == 10 and header['TUNIT8'] == 'rad', header
+mean, std, sigma, local, world, count = maps[:6]
+assert (count == 3).all() and set(np.round(local)) <= {0, 33, 67, 100}
+assert (0 <= world).all() and (world <= 100).all() and abs(world.mean() - 50) < 10, world.mean()
+data = [hp.read_map(f'maps/{i}.fits', dtype=None) for i in range(4)]
+smooth = [hp.smoothing(m, fwhm=np.radians(10), iter=10) for m in data]
+for found, expected in [(mean, np.mean(smooth[1:], axis=0)), (std, np.std(smooth[1:], axis=0, ddof=1))]:
+    assert abs(found - expected).max() < 1e-2 * expected.max(), abs(found - expected).max()
+"#,
+    );
+}
+
+#[test]
+fn smoothing_agrees_with_healpy() {
+    let Some(python) = interpreter() else { return };
+    let folder = Folder::new();
+    run(
+        python,
+        &folder,
+        r#"
+rng = np.random.default_rng(1)
+nside, lmax = 64, 24
+alm = rng.normal(size=hp.Alm.getsize(lmax)) + 1j * rng.normal(size=hp.Alm.getsize(lmax))
+alm[:lmax + 1] = alm[:lmax + 1].real
+smooth = lambda fwhm: hp.alm2map(hp.smoothalm(alm, fwhm=np.radians(fwhm), inplace=False), nside, lmax=lmax)
+np.array([hp.alm2map(alm, nside, lmax=lmax), smooth(5), smooth(12), smooth(40)]).tofile('maps.raw')
+# The harmonics of the map are those it was made of, so that this is healpy's smoothing.
+again = hp.smoothing(hp.alm2map(alm, nside, lmax=lmax), fwhm=np.radians(12), lmax=lmax, iter=20)
+assert abs(again - smooth(12)).max() < 1e-6 * abs(smooth(12)).max(), abs(again - smooth(12)).max()
+"#,
+    );
+    let bytes = std::fs::read(folder.path("maps.raw")).unwrap();
+    let values: Vec<f64> = bytes.chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
+    let maps: Vec<&[f64]> = values.chunks(12 * 64 * 64).collect();
+    let scale = maps[0].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    for (fwhm, expected) in [(5.0, maps[1]), (12.0, maps[2]), (40.0, maps[3])] {
+        let smoothing = Smoothing::new(Healpix::new(64).unwrap(), fwhm).unwrap();
+        let found = smoothing.apply(&[maps[0]]).unwrap().remove(0);
+        let off = difference(&found, expected) / scale;
+        assert!(off < 5e-6, "{fwhm} degrees: off by {off:e} of the largest value");
+    }
 }

@@ -99,7 +99,8 @@ fn moments_by(
     radius: f64,
     weight: Weight,
 ) -> Vec<Vec<f64>> {
-    let selection = Selection { area: true, length: true, curvature: true, ranks: (1..=6).collect(), weight };
+    let selection =
+        Selection { area: true, length: true, curvature: true, ranks: (1..=6).collect(), weight, by_threshold: false };
     MovingWindows {
         field: &Field::new(map.grid(), map.values(), at, body),
         selection: &selection,

@@ -207,6 +207,7 @@ fn compare(case: &Case<'_>, output: usize, radius: f64) -> f64 {
         curvature: true,
         ranks: (1..=8).collect(),
         weight: if case.by_turn { Weight::Curvature } else { Weight::Length },
+        by_threshold: false,
     };
     let map = Map::new("", case.values.to_vec()).unwrap();
     let field = Field::new(grid, map.values(), &thresholds, body);

@@ -18,7 +18,14 @@ pub(crate) fn moments(
     summation: Summation,
     weight: Weight,
 ) -> (Vec<Vec<f64>>, Ways) {
-    let selection = Selection { area: true, length: true, curvature: true, ranks: (1..=RANKS).collect(), weight };
+    let selection = Selection {
+        area: true,
+        length: true,
+        curvature: true,
+        ranks: (1..=RANKS).collect(),
+        weight,
+        by_threshold: false,
+    };
     let thresholds = Thresholds::new(at.to_vec()).unwrap();
     let field = Field::new(map.grid(), map.values(), &thresholds, Body::Above);
     let mut all = MovingWindows {

@@ -2,12 +2,16 @@
 
 /// The program, run as users run it.
 mod cli;
+/// Thresholds by themselves, regions, and Gaussian skies.
+mod graphs;
 /// Files exchanged with healpy.
 mod healpy;
 /// What holds for any map: Gauss–Bonnet, symmetry, duality, additivity, threads.
 mod invariants;
 /// A slow, obvious implementation judges the fast one.
 mod oracle;
+/// Pictures that look as they did.
+mod pictures;
 /// Expected values from an independent implementation, and litchi's, for the data in `LONGAN_SHARED`.
 mod reference;
 /// Bodies and fields whose measures are known in closed form.

@@ -18,7 +18,7 @@ use crate::map::Time;
 use crate::netcdf::Netcdf;
 use crate::ply::SurfacePly;
 use crate::zarr::{self, ZarrStore};
-use crate::{CoordinateSystem, Error, Map, Ordering};
+use crate::{Card, CardValue, CoordinateSystem, Error, Healpix, Map, Ordering};
 
 /// The field of a file that is to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -143,10 +143,35 @@ pub enum Gather {
     Nearest,
 }
 
+/// What maps take, as it shows before one is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Their Nside; where that depends on how close points are, one that suits their number.
+    pub nside: usize,
+    /// About how many bytes one of them takes, with all that it takes to read it.
+    pub bytes: usize,
+}
+
+impl Room {
+    /// That of maps of a grid, and of this many bytes beside one of them.
+    pub(crate) fn of(grid: Healpix, beside: usize) -> Self {
+        Room { nside: grid.nside(), bytes: grid.pixels().saturating_mul(size_of::<f64>()).saturating_add(beside) }
+    }
+
+    /// That of maps made of points, of which each takes this many bytes.
+    pub(crate) fn of_points(nside: Option<usize>, points: usize, bytes: usize) -> Option<Self> {
+        let nside = nside.unwrap_or_else(|| (points as f64 / 12.0).sqrt().ceil().max(1.0) as usize);
+        Some(Room::of(Healpix::new(nside).ok()?, points.saturating_mul(bytes)))
+    }
+}
+
 /// The maps that a selection names: one, or one for each step in time, all on one grid.
 pub trait Maps {
     /// The times of the steps; one map without a time has none and counts as one step.
     fn times(&self) -> &[Time];
+
+    /// What they take; nothing where that does not show before one is read.
+    fn room(&self) -> Option<Room>;
 
     /// Reads one map. What the steps share, such as weights, is computed once.
     ///
@@ -186,6 +211,17 @@ pub struct TableDescription {
     pub dimensions: Vec<DimensionDescription>,
     /// The data columns, or the one field of a variable.
     pub fields: Vec<FieldDescription>,
+    /// What the file says of it: the header entries of a FITS table, whose own numbering of columns and sizes is among
+    /// them, or the attributes of a variable's groups, with their names in capitals. Comments are left out.
+    #[serde(skip)]
+    pub cards: Vec<Card>,
+}
+
+impl TableDescription {
+    /// The value of a header entry.
+    pub fn card(&self, key: &str) -> Option<&CardValue> {
+        self.cards.iter().find(|card| card.key == key).map(|card| &card.value)
+    }
 }
 
 /// Where a table or variable is in its file.

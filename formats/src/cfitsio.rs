@@ -66,6 +66,9 @@ pub(crate) struct Extent {
 /// The longest path that fits into cfitsio's buffers with all that it appends there.
 const PATH_MAX: usize = 1000;
 
+/// The longest text over several lines that is read.
+const LONG_TEXT_MAX: c_int = 1 << 16;
+
 /// cfitsio's status for the end of the file where more was expected.
 const END_OF_FILE: c_int = 107;
 
@@ -242,6 +245,64 @@ impl FitsReader {
         match found {
             Ok(()) => Ok(Some(from_c(&value))),
             Err(Error::Cfitsio { status: KEY_NO_EXIST, .. }) => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// All keywords of the current HDU that have a value, with it as it is written there; texts over several lines are
+    /// joined. Lines that make no sense are left out.
+    pub(crate) fn keys(&mut self) -> Result<Vec<(String, String)>, Error> {
+        let (mut lines, mut room) = (0, 0);
+        // SAFETY: the handle is open; the results outlive the call.
+        call("count the lines of the header", |status| unsafe {
+            sys::ffghsp(self.handle.0, &mut lines, &mut room, status);
+        })?;
+        let mut keys = Vec::new();
+        for line in 1..=lines {
+            let mut key = [0 as c_char; sys::FLEN_KEYWORD as usize];
+            let mut value = [0 as c_char; sys::FLEN_VALUE as usize];
+            let mut comment = [0 as c_char; sys::FLEN_COMMENT as usize];
+            // SAFETY: the handle is open; the buffers have the documented lengths.
+            let read = call(format_args!("read line {line} of the header"), |status| unsafe {
+                sys::ffgkyn(self.handle.0, line, key.as_mut_ptr(), value.as_mut_ptr(), comment.as_mut_ptr(), status);
+            });
+            match read {
+                Err(Error::Cfitsio { .. }) => continue,
+                read => read?,
+            }
+            let (key, value) = (from_c(&key), from_c(&value));
+            if key == "CONTINUE" || value.is_empty() {
+                continue;
+            }
+            let long = if value.ends_with("&'") { self.long_text(&key)? } else { None };
+            keys.push((key, long.unwrap_or(value)));
+        }
+        Ok(keys)
+    }
+
+    /// A keyword's text over several lines, in quotes.
+    fn long_text(&mut self, key: &str) -> Result<Option<String>, Error> {
+        let name = c_text(key);
+        let mut value = vec![0 as c_char; LONG_TEXT_MAX as usize + 1];
+        let mut comment = [0 as c_char; sys::FLEN_COMMENT as usize];
+        let mut len = 0;
+        // SAFETY: the handle is open; `value` has one place more than the characters asked for, and `comment` the
+        // documented length.
+        let read = call(format_args!("read the keyword {key}"), |status| unsafe {
+            sys::ffgsky(
+                self.handle.0,
+                name.as_ptr(),
+                1,
+                LONG_TEXT_MAX,
+                value.as_mut_ptr(),
+                &mut len,
+                comment.as_mut_ptr(),
+                status,
+            );
+        });
+        match read {
+            Ok(()) => Ok(Some(format!("'{}'", from_c(&value).replace('\'', "''")))),
+            Err(Error::Cfitsio { .. }) => Ok(None),
             Err(e) => Err(e),
         }
     }

@@ -58,7 +58,8 @@ fn named(columns: &[Column], name: &str) -> Vec<usize> {
 pub(crate) fn describe(format: &'static str, grid: GridDescription, columns: &[Column]) -> Description {
     let field = |c: &Column| FieldDescription { name: c.name.clone(), unit: c.unit.clone(), long_name: None };
     let fields = columns.iter().filter(|c| c.values).map(field).collect();
-    let table = TableDescription { place: TablePlace::File {}, grid, dimensions: Vec::new(), fields };
+    let table =
+        TableDescription { place: TablePlace::File {}, grid, dimensions: Vec::new(), fields, cards: Vec::new() };
     Description { format, tables: vec![table] }
 }
 

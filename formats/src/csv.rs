@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use crate::columns::{self, Column, shown};
 use crate::directions::{self, FARTHEST, at, from_centre};
 use crate::points::Samples;
-use crate::{Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Selection, Time, UNSEEN, is_bad};
+use crate::{
+    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad,
+};
 
 /// What may part cells.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
@@ -86,12 +88,22 @@ impl Maps for One {
         &[]
     }
 
+    fn room(&self) -> Option<Room> {
+        // Direction and value, and the directions once more in a tree.
+        Room::of_points(self.nside, self.samples.values.len(), 128)
+    }
+
     fn read(&mut self, _: usize) -> Result<Map, Error> {
         let mut map = self.samples.gather(self.nside, &self.regrid)?;
-        let Header { columns, system, .. } = &self.table.header;
+        let Header { columns, system, position, .. } = &self.table.header;
         map.name = columns[self.values].name.clone();
         map.unit = columns[self.values].unit.clone();
         map.coordinates = *system;
+        map.sphere = match position {
+            Position::Cartesian(_) => Sphere::Body,
+            Position::Angles { .. } if system.is_some() => Sphere::Sky,
+            Position::Angles { .. } => Sphere::Earth,
+        };
         Ok(map)
     }
 

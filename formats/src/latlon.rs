@@ -8,8 +8,8 @@ use std::rc::Rc;
 use crate::cf::{self, Horizontal};
 use crate::dataset::{Dataset, Kind, Variable};
 use crate::{
-    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Selection, TableDescription, Time,
-    Weights,
+    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Room, Selection, Sphere,
+    TableDescription, Time, Weights,
 };
 
 /// Lists name at most this many variables.
@@ -71,6 +71,19 @@ impl Maps for Series {
         self.chosen.times()
     }
 
+    fn room(&self) -> Option<Room> {
+        let (values, pixels) = (self.from.values() as f64, self.to.pixels() as f64);
+        let weights = match self.selection.regrid.method {
+            // Cells of a grid that lies askew on another.
+            Method::Conservative => (values.sqrt() + pixels.sqrt()).powi(2),
+            Method::Bilinear => 4.0 * pixels,
+            Method::Nearest => pixels,
+        };
+        // The field, twice; where each pixel's weights end; weights and places, in arrays that may have grown to twice
+        // their length.
+        Some(Room::of(self.to, (16.0 * values + 8.0 * pixels + 24.0 * weights) as usize))
+    }
+
     fn read(&mut self, step: usize) -> Result<Map, Error> {
         let values = self.values(step)?;
         let regrid = &self.selection.regrid;
@@ -84,6 +97,7 @@ impl Maps for Series {
         map.unit = variable.text("units").map(str::to_owned);
         map.long_name = variable.text("long_name").map(str::to_owned);
         map.time = self.times().get(step).cloned();
+        map.sphere = Sphere::Earth;
         Ok(map)
     }
 

@@ -33,12 +33,13 @@ mod zarr_zstd;
 
 pub use adapter::{
     Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
-    Indexing, Maps, Method, Place, Regrid, Selection, TableDescription, TablePlace, describe, is_store, open, read,
+    Indexing, Maps, Method, Place, Regrid, Room, Selection, TableDescription, TablePlace, describe, is_store, open,
+    read,
 };
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
-pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Time, UNSEEN, is_bad};
+pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Sphere, Time, UNSEEN, is_bad};
 pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
 pub use regrid::{LatLon, Weights};
-pub use save::{abandon, check_writable, save};
+pub use save::{abandon, check_writable, save, tidy};

@@ -42,6 +42,19 @@ impl CoordinateSystem {
     }
 }
 
+/// What the sphere of a map is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sphere {
+    /// The sky, seen from inside: what HEALPix in FITS is unless it says otherwise, and all with a celestial
+    /// [`CoordinateSystem`].
+    #[default]
+    Sky,
+    /// The Earth, or another globe of latitudes and longitudes.
+    Earth,
+    /// A body seen from its middle.
+    Body,
+}
+
 /// A time, as the file has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Time {
@@ -66,6 +79,8 @@ pub struct Map {
     pub unit: Option<String>,
     /// The coordinate system, where the file names one.
     pub coordinates: Option<CoordinateSystem>,
+    /// What the sphere is.
+    pub sphere: Sphere,
     /// The ordering of the file that the map was read from (the values here are always in RING order).
     pub ordering: Ordering,
     /// The time of the field, where the file has one.
@@ -92,6 +107,7 @@ impl Map {
             name: name.into(),
             unit: None,
             coordinates: None,
+            sphere: Sphere::default(),
             ordering: Ordering::Ring,
             time: None,
             long_name: None,
@@ -107,6 +123,7 @@ impl Map {
             name: String::new(),
             unit: None,
             coordinates: None,
+            sphere: Sphere::default(),
             ordering: Ordering::Ring,
             time: None,
             long_name: None,

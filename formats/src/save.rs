@@ -1,13 +1,14 @@
 //! The one place that puts a finished file where it belongs.
 //!
 //! A file is written in a temporary folder beside its destination and renamed when complete, so that whoever looks
-//! sees the old file, or none, or the whole new one. What is written is left to others.
+//! sees the old file, or none, or the whole new one. What a killed process leaves is removed by the next that writes
+//! the same file. What is written is left to others.
 
 use std::ffi::OsStr;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tempfile::{TempDir, TempPath};
 
@@ -77,44 +78,191 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A folder for unfinished files, which goes with all that is in it.
-struct Temporary(TempDir);
+/// What folders for unfinished files begin with; the name of what is written follows.
+const PREFIX: &str = ".longan-";
+
+/// Bytes of a file's name that are kept in that of its folder, so that this is not too long; names that begin alike
+/// may share one.
+const NAME_MAX: usize = 200;
+
+/// The file by whose lock processes know of each other.
+const LOCK: &str = "lock";
+
+/// A folder of one's own for an unfinished file, which goes with all that is in it.
+///
+/// It lies in a folder that all who write the same output share. Each of them holds the lock there, shared; the system
+/// frees it when a process ends, however it ends. So whoever gets it alone knows that what else lies there is nobody's,
+/// and removes it. Nothing but tidiness hangs on that: where locks do not work, what killed processes leave stays, and
+/// two that write the same output have folders of their own anyway.
+struct Temporary(Arc<Place>);
+
+struct Place {
+    own: TempDir,
+    shared: PathBuf,
+    /// The lock, where the file system has such.
+    lock: Option<File>,
+}
 
 /// The folders that exist.
-static TEMPORARY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+static TEMPORARY: Mutex<Vec<Arc<Place>>> = Mutex::new(Vec::new());
 
 impl Temporary {
     fn path(&self) -> &Path {
-        self.0.path()
+        self.0.own.path()
     }
 }
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        folders().retain(|folder| folder != self.0.path());
+        folders().retain(|place| !Arc::ptr_eq(place, &self.0));
+        self.0.clear();
     }
 }
 
-fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
+impl Place {
+    /// Makes a folder for what is to be written to a file.
+    fn new(to: &Path) -> io::Result<Self> {
+        let shared = shared_folder(to);
+        loop {
+            match fs::create_dir(&shared) {
+                Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e),
+                _ => (),
+            }
+            let made = Claim::of(&shared).and_then(|claim| {
+                let lock = match claim {
+                    Claim::Locks(lock) if share(&lock, &shared)? => Some(lock),
+                    Claim::NoLocks => None,
+                    Claim::Locks(_) | Claim::Gone => return Ok(None),
+                };
+                Ok(Some(Place { own: tempfile::tempdir_in(&shared)?, shared: shared.clone(), lock }))
+            });
+            match made {
+                Ok(Some(place)) => return Ok(place),
+                // Another that was done has removed the folder in between.
+                Ok(None) => (),
+                Err(e) if e.kind() == io::ErrorKind::NotFound => (),
+                Err(e) => return Err(e),
+            }
+        }
+    }
+
+    /// Removes the folder, and the shared one unless others use it.
+    fn clear(&self) {
+        // Nobody can do more about what stays.
+        let _ = fs::remove_dir_all(self.own.path());
+        match &self.lock {
+            Some(lock) => {
+                let _ = lock.unlock();
+                if lock.try_lock().is_ok() {
+                    remove_shared(&self.shared);
+                }
+            }
+            None => drop(fs::remove_dir(&self.shared)),
+        }
+    }
+}
+
+/// What comes of taking a shared folder's lock.
+enum Claim {
+    /// The lock, had alone or not at all.
+    Locks(File),
+    /// The file system has no locks.
+    NoLocks,
+    /// The folder was removed meanwhile.
+    Gone,
+}
+
+impl Claim {
+    /// Takes the lock of a shared folder and, if nobody else has it, removes what was left there.
+    fn of(shared: &Path) -> io::Result<Self> {
+        let path = shared.join(LOCK);
+        let lock = File::options().create(true).truncate(false).write(true).open(&path)?;
+        match lock.try_lock() {
+            Ok(()) if !is_at(&lock, &path) => return Ok(Claim::Gone),
+            Ok(()) => {
+                for entry in fs::read_dir(shared)?.flatten().filter(|entry| entry.file_name() != LOCK) {
+                    // What cannot be removed is in nobody's way.
+                    let _ = fs::remove_dir_all(entry.path());
+                }
+            }
+            Err(TryLockError::WouldBlock) => (),
+            Err(TryLockError::Error(_)) => {
+                let _ = fs::remove_file(&path);
+                return Ok(Claim::NoLocks);
+            }
+        }
+        Ok(Claim::Locks(lock))
+    }
+}
+
+/// Holds a shared folder's lock among others from now on, unless the folder was removed.
+fn share(lock: &File, shared: &Path) -> io::Result<bool> {
+    lock.unlock()?;
+    // Whoever has it alone has it for no longer than it takes to remove files.
+    lock.lock_shared()?;
+    Ok(is_at(lock, &shared.join(LOCK)))
+}
+
+/// Whether an open file is the one at a path, rather than one that was removed there.
+fn is_at(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        matches!((file.metadata(), fs::metadata(path)), (Ok(a), Ok(b)) if (a.dev(), a.ino()) == (b.dev(), b.ino()))
+    }
+    // There an open file is not removed.
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        path.exists()
+    }
+}
+
+/// Removes a shared folder in which nothing but the lock is, which the caller has alone. What another process puts there
+/// once the lock is gone stays.
+fn remove_shared(shared: &Path) {
+    let _ = fs::remove_file(shared.join(LOCK));
+    let _ = fs::remove_dir(shared);
+}
+
+/// The folder that all share who write a file.
+fn shared_folder(to: &Path) -> PathBuf {
+    let name = to.file_name().unwrap_or_default().to_string_lossy();
+    let end = (0..=name.len().min(NAME_MAX)).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
+    folder_of(to).join(format!("{PREFIX}{}", &name[..end]))
+}
+
+/// Removes what processes that were killed while they wrote this file have left beside it. What is being written now
+/// stays.
+pub fn tidy(path: &Path) {
+    let to = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let shared = shared_folder(&to);
+    if shared.is_dir()
+        && let Ok(Claim::Locks(lock)) = Claim::of(&shared)
+        && lock.try_lock().is_ok()
+    {
+        remove_shared(&shared);
+    }
+}
+
+fn folders() -> MutexGuard<'static, Vec<Arc<Place>>> {
     TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn temporary_folder(to: &Path) -> Result<Temporary, Error> {
     let mut folders = folders();
-    let made = tempfile::Builder::new().prefix(".longan-").tempdir_in(folder_of(to));
     // Without the temporary folder's own name, which tells a user nothing.
-    let made = made.map_err(|cause| Error::Io { action: "write to its folder", cause: cause.kind().into() })?;
-    folders.push(made.path().to_owned());
-    Ok(Temporary(made))
+    let place =
+        Place::new(to).map_err(|cause| Error::Io { action: "write to its folder", cause: cause.kind().into() })?;
+    let place = Arc::new(place);
+    folders.push(place.clone());
+    Ok(Temporary(place))
 }
 
 /// Removes all unfinished files. For a program that is about to end early: no file can be saved from then on.
 pub fn abandon() {
     let folders = folders();
-    for folder in folders.iter() {
-        // Nobody is left to be told.
-        let _ = fs::remove_dir_all(folder);
-    }
+    folders.iter().for_each(|place| place.clear());
     // Kept locked, so that no other folder is made.
     std::mem::forget(folders);
 }

@@ -11,6 +11,7 @@ use longan::picture::{Options, Panel, panels};
 use longan::simulate::{Edge, Waves, scene, shapes};
 use longan::{Analysis, Healpix, Map, MinkowskiMaps, ThresholdUnit};
 
+use super::drawn::save;
 use super::options::{Running, shown};
 use super::output::Provenance;
 use super::simulate::{self, step, waves_cards};
@@ -103,9 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let both = [Panel { values: field.values(), options: top }, Panel { values: &evq_values, options: bottom }];
     let png = panels(&both, 1)?.png()?;
-    formats::save(&path("waves_evq.png"), arguments.overwrite, |temporary| {
-        std::fs::write(temporary, &png).map_err(|cause| formats::Error::Io { action: "write it", cause })
-    })?;
+    save(&path("waves_evq.png"), arguments.overwrite, &png)?;
     say(format!("\nMaps and the picture waves_evq.png are in {}", shown(folder)))
 }
 

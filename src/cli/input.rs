@@ -3,19 +3,20 @@
 //! What files hold, and how it becomes HEALPix, is left to [`longan::formats`].
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
-use longan::formats::{self, At, Error, Field, Gather, Map, Maps, Method, Place, Regrid, Selection};
+use longan::formats::{self, At, Error, Field, Gather, Healpix, Map, Maps, Method, Place, Regrid, Room, Selection};
 
 use super::options::{between, finite, nside, whole};
 
 /// Which map of a file, how it comes to HEALPix, and which pixels of it.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct Input {
     /// Variable or column: its name, or its number counted from 0 as healpy does [default: the first of a FITS table; of
     /// other files the only one].
-    #[arg(long = "variable", visible_alias = "field", value_name = "NAME|NUMBER", value_parser = field)]
+    #[arg(long = "variable", visible_aliases = ["field", "column"], value_name = "NAME|NUMBER", value_parser = field)]
     pub(crate) field: Option<Field>,
     /// Place along a dimension, by the value of its coordinate or by its number from 0, such as level=500,
     /// time=1997-12 or time=#0; may be repeated. Without a place in time there is a map for each step.
@@ -23,7 +24,7 @@ pub(crate) struct Input {
     select: Vec<At>,
     /// Number of the FITS extension, 0 for the primary one [default: the first with a map].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
-    hdu: Option<usize>,
+    pub(crate) hdu: Option<usize>,
     /// Nside to bring fields on other grids, points, surfaces and multi-order (UNIQ) maps to [default: that closest to
     /// their spacing; that of the finest cells].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
@@ -48,7 +49,7 @@ pub(crate) struct Input {
 }
 
 /// How what is not HEALPix comes to be.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Other grids, points and surfaces")]
 struct RegridOptions {
     /// Latitude-longitude grids: the mean over each pixel (exact overlaps), between the four grid points about its
@@ -76,7 +77,7 @@ struct RegridOptions {
     allow_folds: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum MethodOption {
     Conservative,
     Bilinear,
@@ -107,7 +108,7 @@ impl Input {
             Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), ..Selection::default() };
         let mask = |path: &PathBuf| {
             formats::open(path, &selection)?;
-            Ok(Mask { path: path.clone(), selection, threshold: self.mask_threshold, map: None })
+            Ok(Mask { path: path.clone(), selection, threshold: self.mask_threshold, map: Mutex::default() })
         };
         self.mask.as_ref().map(mask).transpose()
     }
@@ -131,8 +132,13 @@ impl Series {
         self.maps.times().len().max(1)
     }
 
+    /// What they take, where that shows before one is read.
+    pub(crate) fn room(&self) -> Option<Room> {
+        self.maps.room()
+    }
+
     /// One of them, masked.
-    pub(crate) fn read(&mut self, step: usize, mask: Option<&mut Mask>) -> Result<Map, Error> {
+    pub(crate) fn read(&mut self, step: usize, mask: Option<&Mask>) -> Result<Map, Error> {
         let mut map = self.maps.read(step).map_err(|problem| of(&self.path, problem))?;
         if let Some(mask) = mask {
             mask.apply(&mut map).map_err(|problem| of(&self.path, problem))?;
@@ -149,25 +155,31 @@ pub(crate) fn of(path: &Path, problem: Error) -> Error {
     }
 }
 
-/// A mask.
+/// A mask, which several threads may share.
 pub(crate) struct Mask {
     path: PathBuf,
     selection: Selection,
     threshold: f64,
     /// It, on the grid of the last map.
-    map: Option<Map>,
+    map: Mutex<Option<Arc<Map>>>,
 }
 
 impl Mask {
     /// Masks a map.
-    fn apply(&mut self, map: &mut Map) -> Result<(), Error> {
-        let mask = match self.map.take().filter(|mask| mask.grid() == map.grid()) {
+    fn apply(&self, map: &mut Map) -> Result<(), Error> {
+        let mask = self.on(map.grid())?;
+        map.apply_mask(&mask, self.threshold)
+    }
+
+    /// It on a grid, read unless that of the last map was the same. Other threads wait for it rather than read it too.
+    fn on(&self, grid: Healpix) -> Result<Arc<Map>, Error> {
+        let mut last = self.map.lock().unwrap_or_else(PoisonError::into_inner);
+        let mask = match last.take().filter(|mask| mask.grid() == grid) {
             Some(mask) => mask,
-            None => self.read(map.grid().nside())?,
+            None => Arc::new(self.read(grid.nside())?),
         };
-        let applied = map.apply_mask(&mask, self.threshold);
-        self.map = Some(mask);
-        applied
+        *last = Some(mask.clone());
+        Ok(mask)
     }
 
     /// The mask at an Nside; at its own where it cannot be brought there.

@@ -4,13 +4,19 @@
 //! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
 //! file.
 
+mod compare;
 mod demo;
+mod drawn;
+mod graph;
 mod info;
 mod input;
+mod jobs;
 mod map;
+mod mapping;
 mod measures;
 mod options;
 mod output;
+mod plot;
 mod plugin;
 mod progress;
 mod regrid;
@@ -35,8 +41,11 @@ Examples:
   longan info sky.fits                   what a file holds
   longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
   longan map sims/*.fits -o maps/        many maps, one output each
+  longan compare sky_evq.fits maps/*.fits -o deviation.fits
   longan map era5.nc -o evq.nc --variable z --select level=500
+  longan plot sky_evq.fits -o evq.png    a picture of a map, PNG or SVG
   longan totals sky.fits                 area, length and Euler characteristic
+  longan graph sky.fits -o graph.png     the same against threshold, drawn
   longan regrid stations.csv -o rainfall.fits --variable rain
   longan plugin new beta                 a crate in Rust for a measure of one's own
 
@@ -50,7 +59,10 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Map(map::Arguments),
+    Compare(compare::Arguments),
     Totals(totals::Arguments),
+    Graph(graph::Arguments),
+    Plot(plot::Arguments),
     Info(info::Arguments),
     Regrid(regrid::Arguments),
     Measures(measures::Arguments),
@@ -65,7 +77,10 @@ pub(crate) fn main() -> ExitCode {
     clean_up_when_stopped();
     let done = match Arguments::parse().command {
         Command::Map(arguments) => map::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
+        Command::Plot(arguments) => plot::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Regrid(arguments) => regrid::run(&arguments),
         Command::Measures(arguments) => measures::run(&arguments),

@@ -8,10 +8,10 @@ use std::str::FromStr;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use longan::formats::Healpix;
-use longan::{Analysis, Body, ThresholdUnit, Thresholds};
+use longan::{Analysis, Body, ThresholdUnit, Thresholds, Weight};
 
 /// Thresholds and the body that they cut out.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Body")]
 pub(crate) struct BodyOptions {
     /// Thresholds: n from lo to hi, evenly or logarithmically spaced, or a list [default: -3:3:13 in sigma].
@@ -56,14 +56,31 @@ pub(crate) enum Format {
 }
 
 /// Sides of a threshold.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub(crate) enum BodyOption {
     Above,
     Below,
 }
 
+/// Weights of the contour's pieces.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub(crate) enum WeightOption {
+    Length,
+    Curvature,
+}
+
+impl WeightOption {
+    /// The weight.
+    pub(crate) fn weight(self) -> Weight {
+        match self {
+            WeightOption::Length => Weight::Length,
+            WeightOption::Curvature => Weight::Curvature,
+        }
+    }
+}
+
 /// Units of thresholds.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub(crate) enum UnitOption {
     Sigma,
     Value,
@@ -119,6 +136,14 @@ pub(crate) fn decimals(x: f64, decimals: usize) -> String {
     match x.abs() {
         0.0 | 1e-3..1e6 => format!("{x:.decimals$}"),
         _ => format!("{x:.decimals$e}"),
+    }
+}
+
+/// Whether two paths lead to the same file, or, where one leads nowhere from here, to files of the same name.
+pub(crate) fn is_same_file(one: &Path, other: &Path) -> bool {
+    match (one.canonicalize(), other.canonicalize()) {
+        (Ok(one), Ok(other)) => one == other,
+        _ => one.file_name() == other.file_name(),
     }
 }
 

@@ -1,7 +1,6 @@
 //! Minkowski maps as they are written: columns, and in headers and attributes what was done.
 
 use std::collections::HashSet;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use longan::formats::{Card, CardValue, Map, NetcdfColumn};
@@ -67,7 +66,7 @@ fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
 }
 
 /// A keyword with a number, within the eight characters of FITS: FORMULA1 to FORMULA9, FORMUL10 and so on.
-fn numbered(keyword: &str, number: usize) -> String {
+pub(crate) fn numbered(keyword: &str, number: usize) -> String {
     let number = number.to_string();
     let room = 8usize.saturating_sub(number.len()).min(keyword.len());
     format!("{}{number}", &keyword[..room])
@@ -229,13 +228,51 @@ pub(crate) fn mask_cards(input: &Input) -> Vec<Card> {
     cards
 }
 
-/// The command that makes an output of this input: as given, without the other inputs.
+/// Options that say how a program runs, and nothing about what it makes.
+const RUNNING: [&str; 4] = ["--resume", "--overwrite", "--quiet", "--verbose"];
+
+/// Those of them that have a value.
+const RUNNING_WITH_VALUE: [&str; 4] = ["--jobs", "--memory", "--shard", "--threads"];
+
+/// Those of them that are letters, which may stand before another.
+const RUNNING_LETTERS: [char; 2] = ['q', 'v'];
+
+/// The command that makes an output of this input: as given, without the other inputs and without options that do not
+/// matter to what is made.
 pub(crate) fn command(inputs: &[PathBuf], input: &Path) -> String {
     let others: HashSet<_> = inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
-    let words: Vec<_> = std::env::args_os().collect();
-    // A mask may be an input too.
-    let kept = |pair: &&[OsString]| ["-m", "--mask"].iter().any(|m| pair[0] == *m) || !others.contains(&*pair[1]);
-    let words: Vec<_> = words.windows(2).filter(kept).map(|pair| pair[1].to_string_lossy()).collect();
-    let quoted = shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_else(|_| words.join(" "));
+    let mut arguments = std::env::args_os().skip(1);
+    let mut words: Vec<String> = Vec::new();
+    let mut only_inputs = false;
+    while let Some(argument) = arguments.next() {
+        let mut word = argument.to_string_lossy().into_owned();
+        // A mask may be an input too.
+        let is_mask = words.last().is_some_and(|last| ["-m", "--mask"].contains(&last.as_str()));
+        if others.contains(argument.as_os_str()) && !is_mask {
+            continue;
+        }
+        only_inputs |= word == "--";
+        if !only_inputs {
+            let name = word.split_once('=').map_or(word.as_str(), |(name, _)| name);
+            if RUNNING.contains(&name) {
+                continue;
+            }
+            if RUNNING_WITH_VALUE.contains(&name) {
+                if name == word {
+                    arguments.next();
+                }
+                continue;
+            }
+            if let Some(letters) = word.strip_prefix('-').filter(|letters| letters.starts_with(RUNNING_LETTERS)) {
+                let rest = letters.trim_start_matches(RUNNING_LETTERS);
+                if rest.is_empty() {
+                    continue;
+                }
+                word = format!("-{rest}");
+            }
+        }
+        words.push(word);
+    }
+    let quoted = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_else(|_| words.join(" "));
     format!("longan {quoted}")
 }

@@ -11,12 +11,12 @@ use longan::measures::{Catalogue, find};
 use super::options::{print, shown};
 
 /// Where measures are loaded from.
-#[derive(Args, Clone, Debug, Default)]
+#[derive(Args, Clone, Debug, Default, PartialEq)]
 pub(crate) struct Plugins {
     /// Library with measures of one's own, beside those in the folders of LONGAN_PLUGIN_PATH; may be repeated. It is
     /// code that runs with your rights.
     #[arg(long, value_name = "FILE")]
-    plugin: Vec<PathBuf>,
+    pub(crate) plugin: Vec<PathBuf>,
 }
 
 impl Plugins {

@@ -1,31 +1,99 @@
 //! Progress of long work, on a terminal only.
 
+use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Steps that the bar distinguishes.
+/// Steps that the bar distinguishes in each part.
 const STEPS: f64 = 1000.0;
 
 /// A bar on standard error, hidden where that is no terminal or where `quiet`.
-pub(crate) struct Progress(ProgressBar);
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    /// Number of parts, where they are counted.
+    parts: Option<usize>,
+    done: AtomicUsize,
+    start: Instant,
+}
+
+/// A part of work that others are done beside.
+pub(crate) struct Part<'a> {
+    of: &'a Progress,
+    position: Cell<u64>,
+}
 
 impl Progress {
     /// Starts a bar with a label.
     pub(crate) fn new(label: String, quiet: bool) -> Self {
-        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(STEPS as u64) };
+        let progress = Progress::with_length(1, None, quiet);
+        progress.bar.set_message(label);
+        progress
+    }
+
+    /// Starts a bar of several parts, which it counts.
+    pub(crate) fn of_parts(parts: usize, quiet: bool) -> Self {
+        Progress::with_length(parts, Some(parts), quiet)
+    }
+
+    fn with_length(length: usize, parts: Option<usize>, quiet: bool) -> Self {
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(length as u64 * STEPS as u64) };
         let style = ProgressStyle::with_template("[{bar:30}] {percent:>3}% {eta:>3} left  {wide_msg}");
-        Progress(bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())).with_message(label))
+        let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Progress { bar, parts, done: AtomicUsize::new(0), start: Instant::now() }
     }
 
     /// Shows the share done, from 0 to 1.
     pub(crate) fn set(&self, share: f64) {
         give_back();
-        self.0.set_position((share * STEPS) as u64);
+        self.bar.set_position((share * STEPS) as u64);
     }
+
+    /// Begins a part, which is done when it is dropped.
+    pub(crate) fn part(&self) -> Part<'_> {
+        Part { of: self, position: Cell::new(0) }
+    }
+
+    /// Does something else on the terminal, such as printing a line.
+    pub(crate) fn aside<R>(&self, what: impl FnOnce() -> R) -> R {
+        self.bar.suspend(what)
+    }
+}
+
+impl Part<'_> {
+    /// Shows the share done, from 0 to 1.
+    pub(crate) fn set(&self, share: f64) {
+        give_back();
+        let position = (share * STEPS) as u64;
+        self.of.bar.inc(position.saturating_sub(self.position.replace(position)));
+    }
+}
+
+impl Drop for Part<'_> {
+    fn drop(&mut self) {
+        self.of.bar.inc((STEPS as u64).saturating_sub(self.position.get()));
+        let done = 1 + self.of.done.fetch_add(1, Ordering::Relaxed);
+        if let Some(parts) = self.of.parts {
+            self.of.bar.set_message(format!("{done} of {parts}, {}", rate(done, self.of.start.elapsed())));
+        }
+    }
+}
+
+/// How many are done in a time, in words.
+pub(crate) fn rate(done: usize, time: Duration) -> String {
+    let per_second = done as f64 / time.as_secs_f64().max(f64::EPSILON);
+    let (rate, unit) = match per_second {
+        1.0.. => (per_second, "second"),
+        rate if 60.0 * rate >= 1.0 => (60.0 * rate, "minute"),
+        rate => (3600.0 * rate, "hour"),
+    };
+    format!("{rate:.1} a {unit}")
 }
 
 /// Returns to the system what finished windows took. GNU's allocator would keep it until the end, when the whole output
 /// needs the room.
-fn give_back() {
+pub(crate) fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: the function only releases pages that nothing is allocated in; it may be called at any time.
     unsafe {
@@ -35,6 +103,6 @@ fn give_back() {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }

@@ -8,11 +8,11 @@ use clap::Args;
 use longan::formats::{self, Map};
 
 use super::input::Input;
-use super::map::Summary;
+use super::mapping::Summary;
 use super::options::{Running, shown};
 use super::output::{command, input_cards, mask_cards, text};
 use super::progress::Progress;
-use super::sink::{self, Kind, MapColumn, OutputOptions, Step, Table};
+use super::sink::{self, Kind, LayoutOptions, MapColumn, Step, Table};
 
 /// The map of a file as HEALPix, whatever it was, with nothing measured.
 #[derive(Args, Debug)]
@@ -32,7 +32,10 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
     #[command(flatten)]
-    output_options: OutputOptions,
+    layout: LayoutOptions,
+    /// Replace existing outputs.
+    #[arg(long, help_heading = "Output")]
+    overwrite: bool,
     #[command(flatten)]
     running: Running,
 }
@@ -40,27 +43,27 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let start = Instant::now();
-    let Arguments { input_file: path, output, input, output_options, running } = arguments;
+    let Arguments { input_file: path, output, input, layout, overwrite, running } = arguments;
     let kind = Kind::of(output)?;
     for source in std::iter::once(path).chain(&input.mask) {
         if let (Ok(from), Ok(to)) = (source.canonicalize(), output.canonicalize()) {
             ensure!(from != to, "{}: the output would replace this input; choose another", shown(source));
         }
     }
-    formats::check_writable(output, output_options.overwrite)?;
-    let mut mask = input.mask()?;
+    formats::check_writable(output, *overwrite)?;
+    let mask = input.mask()?;
     let mut series = input.open(path)?;
     let steps = series.steps();
-    let mut first = Some(series.read(0, mask.as_mut())?);
+    let mut first = Some(series.read(0, mask.as_ref())?);
     let map = first.iter().next().context("a map")?;
     let (name, grid) = (map.name.clone(), map.grid());
-    let layout = output_options.layout(map, grid, kind, steps).with_context(|| shown(path))?;
+    let layout = layout.layout(map, grid, kind, steps).with_context(|| shown(path))?;
     let progress = Progress::new(shown(path), running.quiet);
     let mut summary = Summary::default();
-    sink::write(output, kind, layout, output_options.overwrite, |step| {
+    sink::write(output, kind, layout, *overwrite, |step| {
         let map = match first.take() {
             Some(map) => map,
-            None => series.read(step, mask.as_mut())?,
+            None => series.read(step, mask.as_ref())?,
         };
         progress.set((step + 1) as f64 / steps as f64);
         summary.add(map.values());

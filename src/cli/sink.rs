@@ -14,22 +14,19 @@ use longan::formats::{
 use super::options::shown;
 use super::output::text;
 
-/// How files of maps are written.
-#[derive(Args, Clone, Debug)]
+/// How maps are laid out in files.
+#[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct OutputOptions {
+pub(crate) struct LayoutOptions {
     /// Ordering of the output [default: the input's].
     #[arg(long, value_name = "ORDERING")]
     ordering: Option<OrderingOption>,
     /// Write single precision.
     #[arg(long)]
     float32: bool,
-    /// Replace existing outputs.
-    #[arg(long)]
-    pub(crate) overwrite: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum OrderingOption {
     Ring,
     #[value(alias = "nest")]
@@ -122,7 +119,7 @@ pub(crate) struct Layout {
     pub(crate) steps: usize,
 }
 
-impl OutputOptions {
+impl LayoutOptions {
     /// The layout of a file of maps on a grid that are made from a map.
     pub(crate) fn layout(&self, map: &Map, grid: Healpix, kind: Kind, steps: usize) -> anyhow::Result<Layout> {
         let ordering = match self.ordering {

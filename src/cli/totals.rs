@@ -62,13 +62,13 @@ struct Row {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let path = &arguments.input_file;
-    let mut mask = arguments.input.mask()?;
+    let mask = arguments.input.mask()?;
     let mut series = arguments.input.open(path)?;
     let steps = series.steps();
     let progress = Progress::new(shown(path), arguments.running.quiet);
     let (mut all, mut unit) = (Vec::new(), None);
     for step in 0..steps {
-        let map = series.read(step, mask.as_mut())?;
+        let map = series.read(step, mask.as_ref())?;
         let time = map.time.as_ref().map(|time| time.label.clone());
         let rows = match arguments.body.analysis().totals(&map) {
             // Of a step that has nothing to measure there are no rows.

@@ -104,7 +104,7 @@ impl Drawing {
 }
 
 /// Makes the font known to plotters, which measures texts with it, once.
-static REGISTERED: LazyLock<()> = LazyLock::new(|| {
+pub(super) static REGISTERED: LazyLock<()> = LazyLock::new(|| {
     let registered = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());
     assert!(registered.is_ok(), "the built-in font is a font");
 });
@@ -140,7 +140,7 @@ mod tests {
         assert!(drawing.svg().starts_with("<svg ") && drawing.svg().contains("&lt;M&gt; &amp; ψ₂"));
         let png = drawing.png().unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
-        let mut rgb = vec![0; reader.output_buffer_size()];
+        let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut rgb).unwrap();
         assert_eq!((info.width, info.height), (40, 20));
         let at = |x: usize, y: usize| &rgb[3 * (40 * y + x)..][..3];

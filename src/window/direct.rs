@@ -120,8 +120,7 @@ fn add_pixels(ring: &RingMoments, layout: &Layout, columns: Range<usize>, turns:
         *sum += sum_of(&ring.row(row)[columns.clone()]);
     }
     let ranks = layout.ranks.len();
-    for rank in 0..ranks {
-        let row = layout.first_rank + 2 * rank;
+    for (row, rank) in layout.psi() {
         let (re, im) = (&ring.row(row)[columns.clone()], &ring.row(row + 1)[columns.clone()]);
         let mut sum = Complex64::ZERO;
         for (block, (re, im)) in re.chunks(PIXELS).zip(im.chunks(PIXELS)).enumerate() {

@@ -138,9 +138,14 @@ fn sample(block: &Block<'_>) -> Vec<RingTransport> {
     sample
 }
 
+/// Plain rows, of one group of thresholds: costs are compared for one, and so all are summed in the way of one alone.
+fn plain_rows(layout: &Layout) -> f64 {
+    (layout.plain + usize::from(layout.masked.is_some())) as f64
+}
+
 /// Nanoseconds, about, that adding the block to a quadrant takes directly.
 fn direct_cost(block: &Block<'_>, layout: &Layout) -> f64 {
-    let pixel = 1.0 + 0.3 * layout.first_rank as f64 + 0.7 * layout.ranks.len() as f64;
+    let pixel = 1.0 + 0.3 * plain_rows(layout) + 0.7 * layout.ranks.len() as f64;
     let pair =
         |(ring, r): (&OutputRing, &Reached)| ring.in_quadrant as f64 * (2.0 * r.half_width / r.phi.1 * pixel + 30.0);
     block.pairs().map(pair).sum()
@@ -148,7 +153,7 @@ fn direct_cost(block: &Block<'_>, layout: &Layout) -> f64 {
 
 /// The same from prefix sums with so many terms for all ranks.
 fn cost(block: &Block<'_>, layout: &Layout, terms: usize, width: f64) -> f64 {
-    let (terms, plain) = (terms as f64, layout.first_rank as f64);
+    let (terms, plain) = (terms as f64, plain_rows(layout));
     let tiles = tiles(block.output) as f64;
     let pixels = |i: usize| {
         let (_, _, reached) = block.reaching(i).next()?;
@@ -211,7 +216,7 @@ struct Tile {
     parts: Vec<Range<usize>>,
     /// Sums of the plain rows: for each row, for each output ring, for each pixel.
     plain: Vec<Vec<Vec<f64>>>,
-    /// Σ c_k (differences of prefix sums): for each rank, for each output ring, a set for each pixel.
+    /// Σ c_k (differences of prefix sums): for each ψ_s, for each output ring, a set for each pixel.
     totals: Vec<Vec<Vec<f64>>>,
     /// For each rank e^{i m_k φ} at pixels of the input rings, and, conjugated, of the output rings.
     phases: Vec<(Phases, Phases)>,
@@ -222,8 +227,8 @@ struct Tile {
 struct Input {
     /// Of each plain row.
     plain: Vec<Vec<f64>>,
-    /// Of P e^{i m_k φ}, for each rank.
-    ranks: Vec<Vec<f64>>,
+    /// Of P e^{i m_k φ}, for each ψ_s.
+    psi: Vec<Vec<f64>>,
     /// The ring's pixel at which they begin, counted in the first quadrant.
     first: isize,
     /// The pixels of the ring within each window of the present output ring, counted from there.
@@ -267,14 +272,14 @@ impl Tile {
     fn new(layout: &Layout, plan: &Plan) -> Self {
         let input = || Input {
             plain: vec![vec![0.0]; layout.first_rank],
-            ranks: plan.ranks.iter().map(|rank| vec![0.0; 2 * rank.terms.count()]).collect(),
+            psi: layout.psi().map(|(_, rank)| vec![0.0; 2 * plan.ranks[rank].terms.count()]).collect(),
             first: 0,
             spans: Spans::default(),
         };
         Tile {
             parts: Vec::new(),
             plain: vec![Vec::new(); layout.first_rank],
-            totals: vec![Vec::new(); plan.ranks.len()],
+            totals: vec![Vec::new(); layout.psi().count()],
             phases: plan.ranks.iter().map(|_| Default::default()).collect(),
             inputs: std::array::from_fn(|_| input()),
         }
@@ -292,16 +297,16 @@ impl Tile {
         let parts = &self.parts;
         let zeros = |set: usize| parts.iter().map(|part| vec![0.0; part.len() * set]).collect::<Vec<_>>();
         self.plain.iter_mut().for_each(|totals| *totals = zeros(1));
-        for (rank, plan) in plan.ranks.iter().enumerate() {
-            self.totals[rank] = zeros(2 * plan.terms.count());
-            self.phases[rank] = Default::default();
+        for (totals, (_, rank)) in self.totals.iter_mut().zip(layout.psi()) {
+            *totals = zeros(2 * plan.ranks[rank].terms.count());
         }
+        self.phases.iter_mut().for_each(|phases| *phases = Default::default());
         for first in block.rings.clone().step_by(TOGETHER) {
             let together = first..(first + TOGETHER).min(block.rings.end);
             for number in together.clone() {
                 self.fill(number - first, block, number, quadrant, layout, plan, (west, middle, east));
             }
-            self.add_inputs(block, together, plan, sums);
+            self.add_inputs(block, together, layout, plan, sums);
         }
         self.turn_back(block, layout, plan, middle, sums);
     }
@@ -331,19 +336,19 @@ impl Tile {
         for (row, prefix) in input.plain.iter_mut().enumerate() {
             fill_plain(prefix, moments.row(row), columns);
         }
-        for (rank, (prefix, plan)) in input.ranks.iter_mut().zip(&plan.ranks).enumerate() {
+        for (prefix, (row, rank)) in input.psi.iter_mut().zip(layout.psi()) {
+            let plan = &plan.ranks[rank];
             let set = 2 * plan.terms.count();
             let pixels = (ring.phi_of(all.start) - middle, ring.phi.1, all.len());
             let sets = self.phases[rank].0.at(pixels, &plan.terms.frequencies);
             let sets = &sets[(from - all.start) as usize * set..][..columns.pixels * set];
             prefix.resize((columns.pixels + 1) * set, 0.0);
-            let row = layout.first_rank + 2 * rank;
             fill(set, prefix, moments.row(row), moments.row(row + 1), columns, sets);
         }
     }
 
     /// Adds these input rings to the windows.
-    fn add_inputs(&mut self, block: &Block<'_>, rings: Range<usize>, plan: &Plan, sums: &mut [Sums]) {
+    fn add_inputs(&mut self, block: &Block<'_>, rings: Range<usize>, layout: &Layout, plan: &Plan, sums: &mut [Sums]) {
         let nothing = vec![0.0; plan.ranks.iter().map(|rank| 2 * rank.terms.count()).max().unwrap_or(0)];
         for (i, ring) in block.output.iter().enumerate() {
             let part = self.parts[i].clone();
@@ -367,14 +372,15 @@ impl Tile {
             for (row, totals) in self.plain.iter_mut().enumerate() {
                 add_plain(spans, self.inputs.each_ref().map(|input| &*input.plain[row]), &mut totals[i]);
             }
-            for (rank, plan) in plan.ranks.iter().enumerate() {
+            for (psi, (_, rank)) in layout.psi().enumerate() {
+                let plan = &plan.ranks[rank];
                 let set = 2 * plan.terms.count();
                 let factors = pairs.map(|pair| match pair {
                     Some(pair) => &plan.factors[set * pair..][..set],
                     None => &nothing[..set],
                 });
-                let prefix = self.inputs.each_ref().map(|input| &*input.ranks[rank]);
-                Arch::new().dispatch(AddSpans { set, spans, prefix, factors, totals: &mut self.totals[rank][i] });
+                let prefix = self.inputs.each_ref().map(|input| &*input.psi[psi]);
+                Arch::new().dispatch(AddSpans { set, spans, prefix, factors, totals: &mut self.totals[psi][i] });
             }
         }
     }
@@ -388,11 +394,12 @@ impl Tile {
             for (row, totals) in self.plain.iter().enumerate() {
                 windows.chunks_exact_mut(rows).zip(&totals[i]).for_each(|(window, total)| window[row] += total);
             }
-            for (rank, plan) in plan.ranks.iter().enumerate().filter(|_| !part.is_empty()) {
+            for (totals, (row, rank)) in self.totals.iter().zip(layout.psi()).filter(|_| !part.is_empty()) {
+                let plan = &plan.ranks[rank];
                 let pixels = (middle - ring.phi_of(part.start), -ring.phi.1, part.len());
                 let sets = self.phases[rank].1.at(pixels, &plan.terms.frequencies);
-                let windows = windows[layout.first_rank + 2 * rank..].chunks_mut(rows);
-                turn_back(2 * plan.terms.count(), &self.totals[rank][i], sets, windows);
+                let windows = windows[row..].chunks_mut(rows);
+                turn_back(2 * plan.terms.count(), &totals[i], sets, windows);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Which pixels of an input ring lie in the windows about an output ring. Both ways of summing ask here.
+//! Which pixels of an input ring lie in the windows about an output ring. Both ways of summing ask here, and smoothing.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -12,38 +12,38 @@ const EDGE: f64 = 1e-12;
 
 /// An output ring and the input rings that windows about its pixels reach.
 #[derive(Debug)]
-pub(super) struct OutputRing {
+pub(crate) struct OutputRing {
     /// Its number.
-    pub(super) number: usize,
+    pub(crate) number: usize,
     /// Colatitude in radians.
-    pub(super) theta: f64,
+    pub(crate) theta: f64,
     ring: Ring,
     /// Pixels in a quadrant of the ring; all that follows is the same in each.
-    pub(super) in_quadrant: usize,
+    pub(crate) in_quadrant: usize,
     /// Longitude of the first pixel and distance to the next, in radians.
-    pub(super) phi: (f64, f64),
+    pub(crate) phi: (f64, f64),
     /// Input rings that may be reached.
-    pub(super) reach: Range<usize>,
+    pub(crate) reach: Range<usize>,
 }
 
 /// An input ring that windows about an output ring reach.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reached {
+pub(crate) struct Reached {
     /// Pixels of the ring.
-    pub(super) len: usize,
+    pub(crate) len: usize,
     /// Longitude of the first pixel and distance to the next, in radians.
-    pub(super) phi: (f64, f64),
+    pub(crate) phi: (f64, f64),
     /// Pixels to a radian.
-    pub(super) per_radian: f64,
+    pub(crate) per_radian: f64,
     /// Largest |Δφ| within the window, in radians; π for the whole ring.
-    pub(super) half_width: f64,
+    pub(crate) half_width: f64,
     /// Transport from the ring to the output ring.
-    pub(super) transport: RingTransport,
+    pub(crate) transport: RingTransport,
 }
 
 impl OutputRing {
     /// An output ring and what a radius (radians; 0: the pixel itself) reaches from it.
-    pub(super) fn new(input: Healpix, output: Healpix, number: usize, radius: f64) -> Self {
+    pub(crate) fn new(input: Healpix, output: Healpix, number: usize, radius: f64) -> Self {
         let ring = output.ring(number);
         OutputRing {
             number,
@@ -56,7 +56,7 @@ impl OutputRing {
     }
 
     /// An input ring with its number and colatitude, as seen from here; nothing where it is out of reach.
-    pub(super) fn reached(&self, number: usize, ring: &Ring, theta: f64, radius: f64) -> Option<Reached> {
+    pub(crate) fn reached(&self, number: usize, ring: &Ring, theta: f64, radius: f64) -> Option<Reached> {
         if !self.reach.contains(&number) {
             return None;
         }
@@ -75,12 +75,12 @@ impl OutputRing {
 
     /// Longitude in radians of the `k`-th pixel of the first quadrant.
     #[inline(always)]
-    pub(super) fn phi_of(&self, k: usize) -> f64 {
+    pub(crate) fn phi_of(&self, k: usize) -> f64 {
         self.phi.0 + k as f64 * self.phi.1
     }
 
     /// By how many pixels of an input ring the windows about neighbouring pixels differ, where that is a whole number.
-    pub(super) fn stride(&self, ring: &Reached) -> Option<usize> {
+    pub(crate) fn stride(&self, ring: &Reached) -> Option<usize> {
         let pixels = 4 * self.in_quadrant;
         ring.len.is_multiple_of(pixels).then(|| ring.len / pixels)
     }
@@ -89,7 +89,7 @@ impl OutputRing {
 impl Reached {
     /// The pixels from..to within the window about longitude `phi`, counted on beyond either end of the ring.
     #[inline(always)]
-    pub(super) fn span(&self, phi: f64) -> (isize, isize) {
+    pub(crate) fn span(&self, phi: f64) -> (isize, isize) {
         let offset = phi - self.phi.0;
         // Truncation is the floor of what is not negative.
         let beyond = (4 * self.len) as f64;
@@ -103,13 +103,13 @@ impl Reached {
 
     /// Longitude in radians of a pixel, counted on beyond either end of the ring.
     #[inline(always)]
-    pub(super) fn phi_of(&self, j: isize) -> f64 {
+    pub(crate) fn phi_of(&self, j: isize) -> f64 {
         self.phi.0 + j as f64 * self.phi.1
     }
 
     /// The place in the ring of a pixel counted in the first quadrant, `quadrant`s further on.
     #[inline(always)]
-    pub(super) fn column(&self, j: isize, quadrant: usize) -> usize {
+    pub(crate) fn column(&self, j: isize, quadrant: usize) -> usize {
         (j + (quadrant * self.len / 4) as isize).rem_euclid(self.len as isize) as usize
     }
 }

@@ -54,7 +54,7 @@ fn defaults() {
             ("WEIGHT", "length"),
             ("THRUNIT", "sigma"),
             ("NTHRESH", "13"),
-            ("COMMAND", "longan map sky.fits -o evq.fits --overwrite"),
+            ("COMMAND", "longan map sky.fits -o evq.fits"),
         ] {
             // The smallest maps have rows of one value.
             let value = if nside_out == "8" && key == "TFORM1" { "1D" } else { value };

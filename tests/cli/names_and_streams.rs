@@ -179,6 +179,7 @@ fn help_fits_a_terminal_and_its_examples_run() {
         "-h",
         "map --help",
         "map -h",
+        "compare --help",
         "totals --help",
         "regrid --help",
         "info --help",
@@ -197,20 +198,26 @@ fn help_fits_a_terminal_and_its_examples_run() {
     folder.write("rain.fits", &map_file(&values, &[]));
     folder.write("mask.fits", &map_file(&[1.0; 3072], &[]));
     std::fs::create_dir(folder.path("sims")).unwrap();
-    std::fs::copy(folder.path("sky.fits"), folder.path("sims/one.fits")).unwrap();
+    for seed in [1, 2] {
+        folder.done(&format!("simulate waves -o sims/sim{seed}.fits --nside 16 --correlation 15 --seed {seed}"));
+    }
     netcdf_with_levels(&folder.path("era5.nc"));
     let row = |i: usize| format!("{},{},{}\n", i * 7 % 360, i as f64 / 4.0 - 80.0, i % 11);
     let stations: String = (0..640).map(row).collect();
     folder.write("stations.csv", ("lon,lat,rain\n".to_owned() + &stations).as_bytes());
     folder.write("cell.ply", TETRAHEDRON.as_bytes());
     let mut run = 0;
-    for words in ["--help", "map --help", "totals --help", "regrid --help", "simulate --help"] {
+    for words in ["--help", "map --help", "totals --help", "regrid --help", "simulate --help", "compare --help"] {
         let help = folder.done(words);
         let examples = help.lines().filter(|l| l.starts_with("  longan "));
         for example in examples {
             // What follows the command is an explanation; the demonstration has a test of its own.
             let words = example.trim_start().strip_prefix("longan ").unwrap().split("   ").next().unwrap();
-            let words = words.split(" > ").next().unwrap().replace("sims/*.fits", "sims/one.fits");
+            let words = words.split(" > ").next().unwrap().to_owned();
+            let words = ["sims/*.fits", "maps/*.fits", "maps/sim*.fits"].iter().fold(words, |words, all| {
+                let folder = all.split('/').next().unwrap();
+                words.replace(all, &format!("{folder}/sim1.fits {folder}/sim2.fits"))
+            });
             if words.starts_with("demo") {
                 continue;
             }

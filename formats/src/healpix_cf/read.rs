@@ -8,9 +8,12 @@ use rayon::prelude::*;
 
 use super::grid::{Grid, Scheme};
 use crate::canvas::{CHUNK, Canvas};
-use crate::dataset::{Array, Dataset, Variable};
+use crate::dataset::{Array, Attribute, Dataset, Variable};
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
-use crate::{Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Selection, Time, UNSEEN, cf, is_bad};
+use crate::{
+    CoordinateSystem, Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Room, Selection, Sphere, Time,
+    UNSEEN, cf, is_bad,
+};
 
 /// Finds what is selected of a field.
 pub(super) fn open(dataset: &Rc<dyn Dataset>, variable: usize, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
@@ -38,7 +41,17 @@ pub(super) fn describe(dataset: &dyn Dataset, field: &Variable, grid: &Grid) -> 
         }
     };
     let pixels = field.dimensions[grid.dimension].len;
-    Ok(GridDescription::Healpix { nside, ordering, ordering_assumed: false, coordinates: None, indexing, pixels })
+    let coordinates = coordinates(dataset);
+    Ok(GridDescription::Healpix { nside, ordering, ordering_assumed: false, coordinates, indexing, pixels })
+}
+
+/// The celestial coordinate system that the file names, as longan does. Without one it is of the Earth, as CF is.
+fn coordinates(dataset: &dyn Dataset) -> Option<CoordinateSystem> {
+    let named = dataset.group_attributes("/").iter().find(|(name, _)| name.eq_ignore_ascii_case("coordsys"));
+    match named {
+        Some((_, Attribute::Text(system))) => CoordinateSystem::parse(system),
+        _ => None,
+    }
 }
 
 /// What each cell of a field is.
@@ -63,6 +76,15 @@ struct Field {
 impl Maps for Field {
     fn times(&self) -> &[Time] {
         self.chosen.times()
+    }
+
+    fn room(&self) -> Option<Room> {
+        let (grid, cells) = match &self.cells {
+            Cells::All(grid, _) => (*grid, grid.pixels()),
+            Cells::Some(grid, _, places) => (*grid, 2 * places.len()),
+            Cells::Sizes(places, _) => (Healpix::new(self.nside?).ok()?, 4 * places.len()),
+        };
+        Some(Room::of(grid, cells.saturating_mul(size_of::<f64>())))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {
@@ -112,6 +134,8 @@ impl Maps for Field {
         map.long_name = variable.text("long_name").or(variable.text("standard_name")).map(str::to_owned);
         map.ordering = ordering;
         map.time = self.chosen.times().get(step).cloned();
+        map.coordinates = coordinates(&*self.dataset);
+        map.sphere = if map.coordinates.is_some() { Sphere::Sky } else { Sphere::Earth };
         Ok(map)
     }
 }

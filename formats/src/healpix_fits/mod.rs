@@ -18,7 +18,7 @@ use tempfile::NamedTempFile;
 
 use crate::adapter::{gunzipped_head, is_gzip};
 use crate::cfitsio::FitsReader;
-use crate::{Adapter, Description, Error, Map, Maps, Selection, Time};
+use crate::{Adapter, Description, Error, Healpix, Map, Maps, Room, Selection, Time};
 
 pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 
@@ -65,6 +65,22 @@ struct One {
 impl Maps for One {
     fn times(&self) -> &[Time] {
         &[]
+    }
+
+    fn room(&self) -> Option<Room> {
+        let column = self.table.column(self.selection.field.as_ref()).ok()?;
+        let grid = match &self.table.layout {
+            table::Layout::Implicit { named } => self.table.implicit(column, *named).ok()?.0,
+            table::Layout::Explicit { index, .. } => self.table.explicit_grid(index).ok()?,
+            table::Layout::MultiOrder { .. } => Healpix::new(self.selection.nside?).ok()?,
+        };
+        // A mark for each pixel that is named, or a place and a value for each cell.
+        let beside = match self.table.layout {
+            table::Layout::Implicit { .. } => 0,
+            table::Layout::Explicit { .. } => grid.pixels() / 8,
+            table::Layout::MultiOrder { .. } => self.table.rows.saturating_mul(16),
+        };
+        Some(Room::of(grid, beside))
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {

@@ -9,8 +9,8 @@ use std::ops::Range;
 use super::multi_order;
 use crate::cfitsio::FitsReader;
 use crate::{
-    CoordinateSystem, Error, Field, FieldDescription, GridDescription, Healpix, Indexing, Ordering, TableDescription,
-    TablePlace,
+    Card, CardValue, CoordinateSystem, Error, Field, FieldDescription, GridDescription, Healpix, Indexing, Ordering,
+    TableDescription, TablePlace,
 };
 
 /// A HEALPix table.
@@ -217,7 +217,15 @@ impl Table {
             },
             dimensions: Vec::new(),
             fields: self.columns.iter().map(field).collect(),
+            cards: self.cards(fits)?,
         })
+    }
+
+    /// The entries of the header.
+    fn cards(&self, fits: &mut FitsReader) -> Result<Vec<Card>, Error> {
+        fits.go(self.hdu)?;
+        let card = |(key, value): (String, String)| Card { key, value: card_value(&value), comment: String::new() };
+        Ok(fits.keys()?.into_iter().map(card).collect())
     }
 
     /// The data column that a field is in, known to hold numbers.
@@ -383,12 +391,31 @@ pub(super) fn bad_key(hdu: usize, key: &str, value: impl ToString, expected: &'s
 /// A keyword's text, `None` where it is absent or blank. A number is the text of its digits.
 pub(super) fn text(fits: &mut FitsReader, key: &str) -> Result<Option<String>, Error> {
     Ok(fits.key(key)?.and_then(|raw| {
-        let text = raw
-            .strip_prefix('\'')
-            .map_or(raw.clone(), |quoted| quoted.strip_suffix('\'').unwrap_or(quoted).replace("''", "'"));
+        let text = unquoted(&raw).unwrap_or(raw);
         let text = text.trim();
         (!text.is_empty()).then(|| text.to_owned())
     }))
+}
+
+/// What stands between quotes; nothing where there are none.
+fn unquoted(raw: &str) -> Option<String> {
+    raw.strip_prefix('\'').map(|quoted| quoted.strip_suffix('\'').unwrap_or(quoted).replace("''", "'"))
+}
+
+/// The value of a header entry as it is written there. What is neither a number nor a truth value is text.
+fn card_value(raw: &str) -> CardValue {
+    if let Some(text) = unquoted(raw) {
+        return CardValue::Text(text.trim_end().to_owned());
+    }
+    match raw.trim() {
+        "T" => CardValue::Logical(true),
+        "F" => CardValue::Logical(false),
+        raw => match (raw.parse(), raw.replace(['D', 'd'], "E").parse()) {
+            (Ok(whole), _) => CardValue::Integer(whole),
+            (_, Ok(real)) => CardValue::Real(real),
+            _ => CardValue::Text(raw.to_owned()),
+        },
+    }
 }
 
 /// A keyword's number, `None` where it is absent or no number. Some files write numbers as text.

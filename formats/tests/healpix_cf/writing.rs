@@ -159,6 +159,23 @@ fn the_header_is_as_documented() {
 }
 
 #[test]
+fn what_a_file_says_of_itself_is_what_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.nc");
+    let layout = layout(4, Ordering::Ring, false, 1);
+    write(&path, &layout, 1).unwrap();
+    let tables = describe(&path).unwrap().tables;
+    assert!(tables.len() == 2 && tables[0].cards == tables[1].cards);
+    for Card { key, value, .. } in &layout.attributes {
+        match value {
+            CardValue::Logical(truth) => assert_eq!(tables[0].card(key), Some(&CardValue::Text(truth.to_string()))),
+            CardValue::Text(text) if text.is_empty() => {}
+            value => assert_eq!(tables[0].card(key), Some(value), "{key}"),
+        }
+    }
+}
+
+#[test]
 fn names_that_clash() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.nc");

@@ -1,6 +1,9 @@
 //! Headers with keywords missing, misspelt, wrong or absurd.
 
-use longan_formats::{CoordinateSystem, Error, GridDescription, Ordering, describe};
+use longan_formats::{
+    Card, CardValue, Column, CoordinateSystem, Error, Extension, GridDescription, Healpix, HealpixFile, Ordering,
+    describe, write_healpix,
+};
 
 use crate::bytes::{Col, col, f64s, file, header, i64s, picture, primary, table};
 use crate::*;
@@ -246,4 +249,53 @@ fn headers_without_an_end() {
     assert!(matches!(problem_with(&endless, &Selection::default()).0, Error::CutShort { .. }));
     let primary = header(&[("SIMPLE", "T".to_owned())]);
     drop(problem_with(&primary, &Selection::default()));
+}
+
+#[test]
+fn what_a_file_says_of_itself_is_what_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.fits");
+    let long = "O'Neill's ".repeat(40).trim_end().to_owned();
+    let card = |key: &str, value| Card { key: key.to_owned(), value, comment: "a comment".to_owned() };
+    let cards = vec![
+        card("WINDOW", CardValue::Real(6.0)),
+        card("THR1", CardValue::Real(-1.25e-7)),
+        card("NTHRESH", CardValue::Integer(13)),
+        card("BODY", CardValue::Text("above".into())),
+        card("COMMAND", CardValue::Text(long)),
+        card("SHARP", CardValue::Logical(true)),
+        card("EMPTY", CardValue::Text(String::new())),
+        card("AFTER", CardValue::Integer(-1)),
+    ];
+    let extension = |name: &str, cards| Extension {
+        name: name.to_owned(),
+        cards,
+        history: vec!["what happened".to_owned()],
+        columns: vec![Column { name: "EVQ".into(), unit: "mK".into(), values: ring_values() }],
+    };
+    let file = HealpixFile {
+        grid: Healpix::new(2).unwrap(),
+        ordering: Ordering::Ring,
+        coordinates: None,
+        float32: false,
+        extensions: vec![extension("A", cards.clone()), extension("B", cards[..1].to_vec())],
+    };
+    write_healpix(&path, &file, false).unwrap();
+    let tables = describe(&path).unwrap().tables;
+    for Card { key, value, .. } in &cards {
+        assert_eq!(tables[0].card(key), Some(value), "{key}");
+    }
+    assert_eq!(tables[1].card("WINDOW"), Some(&CardValue::Real(6.0)));
+    assert_eq!(tables[1].card("BODY"), None);
+    assert_eq!((tables[0].fields[0].name.as_str(), tables[0].fields[0].unit.as_deref()), ("EVQ", Some("mK")));
+}
+
+#[test]
+fn lines_that_make_no_sense_are_passed_over() {
+    let mut bytes = with_keys(&[("NSIDE", "2"), ("OPENED", "'never closed"), ("WORD", "word"), ("DOUBLE", "1.5D1")]);
+    let line = bytes.windows(6).position(|w| w == b"OPENED").unwrap();
+    bytes[line + 40..line + 44].copy_from_slice(b"\xff\x01\0\xb5");
+    let table = describe(&scratch(&bytes).path).unwrap().tables.remove(0);
+    assert_eq!(table.card("DOUBLE"), Some(&CardValue::Real(15.0)));
+    assert_eq!(table.card("WORD"), Some(&CardValue::Text("word".into())));
 }

@@ -1,0 +1,336 @@
+//! What defines a computation of Minkowski maps, and the way of one file to its Minkowski maps.
+//!
+//! Which files there are, and what becomes of a failure, is left to the commands.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::Context;
+use clap::Args;
+use longan::formats::{Error, Healpix, Map, Room};
+use longan::measures::{Catalogue, CatalogueError, Measure, split};
+use longan::statistics::{Statistics, statistics};
+use longan::window::{Summation, Ways};
+use longan::{Analysis, AnalysisError, MinkowskiMaps};
+
+use super::input::{self, Input, Mask};
+use super::jobs::Memory;
+use super::misused;
+use super::options::{BodyOptions, WeightOption, between, check_memory, decimals, is_same_file, nside, shown};
+use super::output::Provenance;
+use super::plugin::Plugins;
+use super::sink::{self, Kind, LayoutOptions};
+
+/// What of a file is measured, how, and in which layout the result is written.
+#[derive(Args, Clone, Debug, PartialEq)]
+pub(crate) struct Mapping {
+    /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
+    /// "beta = (w1 - psi2)/(w1 + psi2)"; may be repeated. `longan measures` lists all measures, and
+    /// `longan measures --help` explains formulas [default: evq].
+    #[arg(long, value_name = "LIST")]
+    measure: Vec<String>,
+    #[command(flatten)]
+    plugins: Plugins,
+    /// Radius of the window in degrees, from 0 to 180; 0: each pixel by itself, at the map's own Nside. Several, such as
+    /// 4,6,10, make an extension each, in NetCDF variables such as EVQ_WINDOW_4.
+    #[arg(long, value_name = "DEG,...", default_value = "6", value_delimiter = ',')]
+    #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
+    window: Vec<f64>,
+    /// Nside of the output [default: the smaller of 16 and the input's; for --window 0 the input's].
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nside)]
+    nside_out: Option<usize>,
+    /// Weight of the contour's pieces in tensors: their length (W_1) or their curvature (W_2).
+    #[arg(long, value_name = "WEIGHT", default_value = "length")]
+    weight: WeightOption,
+    /// Write one extension, in NetCDF variables such as EVQ_THRESHOLD_1, for each threshold instead of the mean over
+    /// thresholds.
+    #[arg(long)]
+    sequence: bool,
+    /// Windows with a larger share of masked cells than this, from 0 to 1, are masked.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0625)]
+    #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 1.0))]
+    max_masked: f64,
+    /// Largest error of psi_s, as a share of the window's contour length, where many and large windows are summed
+    /// from prefix sums; areas, lengths and curvatures are exact always.
+    #[arg(long, value_name = "X", default_value_t = 1e-7)]
+    #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 1e-12, 0.1))]
+    tolerance: f64,
+    /// Sum every window pixel by pixel, however long it takes.
+    #[arg(long, conflicts_with = "tolerance")]
+    exact: bool,
+    #[command(flatten)]
+    body: BodyOptions,
+    #[command(flatten)]
+    input: Input,
+    #[command(flatten)]
+    layout: LayoutOptions,
+}
+
+/// The measure where none is asked for.
+const DEFAULT: &str = "evq";
+
+/// Columns that a FITS table can have.
+const COLUMNS_MAX: usize = 999;
+
+impl Mapping {
+    /// What maps files, once it is clear that the mask can be read.
+    pub(crate) fn mapper(&self, measures: Vec<Arc<dyn Measure>>, memory: Memory) -> anyhow::Result<Mapper<'_>> {
+        Ok(Mapper { mapping: self, measures, mask: self.input.mask()?, analysis: self.analysis(), memory })
+    }
+
+    /// Whether these options ask for the same as others, in whatever way they are given.
+    pub(crate) fn is_same(&self, other: &Mapping) -> bool {
+        let [one, other] = [self, other].map(|mapping| {
+            let mut mapping = mapping.clone();
+            mapping.measure = mapping.measure.iter().flat_map(|list| split(list)).map(str::to_owned).collect();
+            if mapping.measure.is_empty() {
+                mapping.measure.push(DEFAULT.to_owned());
+            }
+            let masks: Vec<PathBuf> = mapping.input.mask.take().into_iter().collect();
+            let plugins = std::mem::take(&mut mapping.plugins.plugin);
+            (mapping, masks, plugins)
+        });
+        let same = |these: &[PathBuf], those: &[PathBuf]| {
+            these.len() == those.len() && std::iter::zip(these, those).all(|(this, that)| is_same_file(this, that))
+        };
+        one.0 == other.0 && same(&one.1, &other.1) && same(&one.2, &other.2)
+    }
+
+    /// The measures asked for, as they were.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.measure.iter().flat_map(|list| split(list))
+    }
+
+    /// Which maps of files are read.
+    pub(crate) fn input(&self) -> &Input {
+        &self.input
+    }
+
+    /// How results are laid out.
+    pub(crate) fn layout(&self) -> &LayoutOptions {
+        &self.layout
+    }
+
+    /// The file of the mask.
+    pub(crate) fn mask(&self) -> Option<&Path> {
+        self.input.mask.as_deref()
+    }
+
+    /// The measures asked for, no two the same. `command` is whose arguments these are.
+    pub(crate) fn measures(&self, command: &str) -> anyhow::Result<Vec<Arc<dyn Measure>>> {
+        let catalogue = self.plugins.catalogue()?;
+        let mut measures: Vec<Arc<dyn Measure>> = Vec::new();
+        for text in self.names() {
+            let measure = find(&catalogue, text, command)?;
+            if let Some(other) = measures.iter().find(|other| other.column().eq_ignore_ascii_case(&measure.column())) {
+                let [one, other] = [measure.name(), other.name()];
+                let twice = if one == other { "is given twice".into() } else { format!("has the column of '{other}'") };
+                return Err(no_measure(text, format!("'{one}' {twice}"), command));
+            }
+            measures.push(measure);
+        }
+        if measures.len() > COLUMNS_MAX {
+            let problem =
+                format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len());
+            return Err(misused(command, problem));
+        }
+        if measures.is_empty() {
+            measures.push(catalogue.find(&format!("longan:{DEFAULT}"))?);
+        }
+        Ok(measures)
+    }
+
+    /// The analysis.
+    fn analysis(&self) -> Analysis {
+        Analysis {
+            windows: self.window.clone(),
+            weight: self.weight.weight(),
+            nside_out: self.nside_out,
+            max_masked: self.max_masked,
+            summation: if self.exact { Summation::Exact } else { Summation::Tolerance(self.tolerance) },
+            ..self.body.analysis()
+        }
+    }
+}
+
+/// The measure of a name or formula.
+pub(crate) fn find(catalogue: &Catalogue, text: &str, command: &str) -> anyhow::Result<Arc<dyn Measure>> {
+    catalogue.find(text).map_err(|e| match &e {
+        CatalogueError::Formula(formula) => no_measure(text, format!("{e}\n\n{}", formula.marked()), command),
+        _ => no_measure(text, e.to_string(), command),
+    })
+}
+
+/// What is said of a text that names no measure that can be taken.
+pub(crate) fn no_measure(text: &str, problem: impl fmt::Display, command: &str) -> anyhow::Error {
+    misused(command, format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
+}
+
+/// A computation that is ready for files; several threads may share it.
+pub(crate) struct Mapper<'a> {
+    mapping: &'a Mapping,
+    measures: Vec<Arc<dyn Measure>>,
+    mask: Option<Mask>,
+    analysis: Analysis,
+    memory: Memory,
+}
+
+/// What is made of one file.
+pub(crate) struct Made {
+    /// The Minkowski maps, in a few words.
+    pub(crate) summary: String,
+    /// For each window how it was summed, and why.
+    pub(crate) ways: Vec<String>,
+    /// What a user should know.
+    pub(crate) warning: Option<String>,
+}
+
+impl Mapper<'_> {
+    /// Maps one file to one file. `command` goes into its header; `progress` is told the share done, from 0 to 1.
+    pub(crate) fn map(
+        &self,
+        path: &Path,
+        output: &Path,
+        overwrite: bool,
+        command: &str,
+        progress: impl Fn(f64),
+    ) -> anyhow::Result<Made> {
+        let Mapper { mapping, measures, mask, analysis, memory } = self;
+        let mut series = mapping.input.open(path)?;
+        let _taken = memory.take(series.room().and_then(|room| self.bytes(room))).with_context(|| shown(path))?;
+        let start = Instant::now();
+        let steps = series.steps();
+        let map = series.read(0, mask.as_ref())?;
+        let about = || shown(path);
+        let kind = Kind::of(output)?;
+        let grid = analysis.check(map.grid()).with_context(about)?;
+        let layout = mapping.layout.layout(&map, grid, kind, steps).with_context(about)?;
+        let tables = self.tables();
+        check_memory(grid, tables * measures.len()).with_context(about)?;
+        let mut first = Some(map);
+        let mut summary = Summary::default();
+        let mut ways = Vec::new();
+        let mut empty = Vec::new();
+        sink::write(output, kind, layout, overwrite, |step| {
+            let map = match first.take() {
+                Some(map) => map,
+                None => series.read(step, mask.as_ref())?,
+            };
+            let told = |share| progress((step as f64 + share) / steps as f64);
+            let maps = match mapping.sequence {
+                true => analysis.sequence(&map, measures, told),
+                false => analysis.minkowski_maps(&map, measures, told),
+            };
+            let maps = match maps {
+                Err(AnalysisError::AllMasked | AnalysisError::Constant { .. }) if steps > 1 => {
+                    empty.push(map.time.as_ref().map(|time| time.label.clone()).unwrap_or_default());
+                    undefined(analysis, &map, grid, tables, measures.len())
+                }
+                maps => maps.map_err(|e| {
+                    let when = map.time.as_ref().filter(|_| steps > 1).map(|time| format!("at {}: ", time.label));
+                    input::of(path, Error::NoResult { reason: format!("{}{e}", when.unwrap_or_default()) })
+                })?,
+            };
+            if step == 0 {
+                ways = maps.iter().map(explained).collect();
+            }
+            summary.add(&maps[0].values[0]);
+            let input = Some(&mapping.input);
+            Ok(Provenance { path, map: &map, input, analysis, command: command.to_owned() }.step(maps, measures))
+        })?;
+        let warning = empty.first().map(|one| {
+            let (about, n) = (about(), empty.len());
+            let others = if n > 1 { format!(" and {} other steps", n - 1) } else { String::new() };
+            format!("{about}: the map at {one}{others} is masked or constant, so the result is masked there")
+        });
+        let of = if steps > 1 { format!("{steps} steps of ") } else { String::new() };
+        let all = format!("{of}{} of Nside {}", measures[0].column(), grid.nside());
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(Made { summary: format!("{all} {summary} ({seconds:.2} s)"), ways, warning })
+    }
+
+    /// About how many bytes it takes to map a file, where that shows before it is read.
+    fn bytes(&self, room: Room) -> Option<usize> {
+        let grid = Healpix::new(room.nside).ok()?;
+        let mask = if self.mask.is_some() { grid.pixels().saturating_mul(size_of::<f64>()) } else { 0 };
+        // Where there is an error, mapping says so.
+        let maps = self.analysis.memory(grid, &self.measures, self.mapping.sequence).ok()?;
+        Some(room.bytes.saturating_add(mask).saturating_add(maps))
+    }
+
+    /// The number of Minkowski maps of each measure that a step makes.
+    pub(crate) fn tables(&self) -> usize {
+        let thresholds = if self.mapping.sequence { self.analysis.thresholds.values().len() } else { 1 };
+        self.analysis.windows.len() * thresholds
+    }
+}
+
+/// The result for a map that has no shape to measure: nothing but masked pixels.
+fn undefined(analysis: &Analysis, map: &Map, grid: Healpix, tables: usize, measures: usize) -> Vec<MinkowskiMaps> {
+    let nothing = Statistics { unmasked: 0, min: f64::NAN, max: f64::NAN, mean: f64::NAN, sigma: f64::NAN };
+    let each = tables / analysis.windows.len();
+    let of = |window: &f64| MinkowskiMaps {
+        grid,
+        window: *window,
+        thresholds: analysis.thresholds.clone(),
+        of_map: statistics(map.values()).unwrap_or(nothing),
+        values: vec![vec![f64::NAN; grid.pixels()]; measures],
+        ways: Ways::default(),
+    };
+    analysis.windows.iter().flat_map(|window| std::iter::repeat_n(of(window), each)).collect()
+}
+
+/// What maps hold, in a few words.
+#[derive(Default)]
+pub(crate) struct Summary {
+    /// Of all maps so far.
+    of_all: Option<Statistics>,
+    pixels: usize,
+}
+
+impl Summary {
+    /// Takes one more map into account.
+    pub(crate) fn add(&mut self, values: &[f64]) {
+        self.pixels += values.len();
+        let Some(new) = statistics(values) else { return };
+        self.of_all = Some(match self.of_all {
+            None => new,
+            Some(old) => {
+                let unmasked = old.unmasked + new.unmasked;
+                let mean = (old.mean * old.unmasked as f64 + new.mean * new.unmasked as f64) / unmasked as f64;
+                Statistics { unmasked, mean, min: old.min.min(new.min), max: old.max.max(new.max), ..new }
+            }
+        });
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(s) = self.of_all else { return f.write_str("is masked or undefined everywhere") };
+        let [min, max, mean] = [s.min, s.max, s.mean].map(|x| decimals(x, 4));
+        let (without, pixels) = (self.pixels - s.unmasked, self.pixels);
+        write!(f, "from {min} to {max}, mean {mean}, {without} of {pixels} pixels masked or undefined")
+    }
+}
+
+/// How the windows of a map were summed, and why.
+fn explained(maps: &MinkowskiMaps) -> String {
+    let Ways { direct, missed, prefix, error, terms } = maps.ways;
+    let mut ways = Vec::new();
+    let all = (direct + missed + prefix).max(1) as f64;
+    let mut way = |pairs: usize, how: String| {
+        let percent = 100.0 * pairs as f64 / all;
+        match pairs {
+            0 => (),
+            _ if percent < 0.1 => ways.push(format!("less than 0.1 % {how}")),
+            _ => ways.push(format!("{percent:.1} % {how}")),
+        }
+    };
+    way(prefix, format!("from prefix sums with up to {terms} terms, psi_s to {error:.1e} of W1"));
+    way(direct, "pixel by pixel, which costs less there or was asked for".to_owned());
+    way(missed, "pixel by pixel, since no fit met the tolerance".to_owned());
+    let pairs = "of all pairs of an output pixel and an input ring";
+    format!("window of {} degrees, {pairs}: {}", maps.window, ways.join("; "))
+}
