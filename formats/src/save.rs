@@ -114,8 +114,10 @@ impl Temporary {
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        folders().retain(|place| !Arc::ptr_eq(place, &self.0));
+        // Locked until all is removed, for a program that is told to end meanwhile.
+        let mut folders = folders();
         self.0.clear();
+        folders.retain(|place| !Arc::ptr_eq(place, &self.0));
     }
 }
 
