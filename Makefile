@@ -10,7 +10,8 @@ export PKG_CONFIG_PATH := $(if $(PKG_CONFIG_PATH),$(PKG_CONFIG_PATH):)$(CONDA_PR
 export RUSTFLAGS += $(shell [ ! -e '$(CONDA_PREFIX)/lib/pkgconfig/cfitsio.pc' ] || echo '-Clink-arg=-Wl,-rpath,$(CONDA_PREFIX)/lib')
 endif
 
-# The folders that `make demo` writes and `make gallery` keeps its data in, what `make bench` measures, and flags for every cargo command that resolves packages, such as --locked.
+# The folders that `make demo` writes and `make gallery` keeps its data in, what `make bench` measures, and flags for
+# every cargo command that resolves packages, such as --locked.
 DEMO = demo
 GALLERY = gallery
 NSIDE = 512
@@ -25,8 +26,8 @@ demo: setup ## build longan and write its demonstration into demo/
 	cargo run --release --bin longan $(CARGOFLAGS) -- demo $(DEMO) --overwrite
 
 gallery: setup ## draw the figures of the README and the docs from data made in gallery/
-	cargo build --release --bin longan $(CARGOFLAGS)
-	cargo run --release --example gallery $(CARGOFLAGS) -- $(GALLERY)
+	cargo build --release --bin longan --example gallery $(CARGOFLAGS)
+	target/release/examples/gallery $(GALLERY)
 	tools/gallery target/release/longan $(GALLERY) docs/gallery
 
 # The tests come last, so that what the run ends with is their own summary.

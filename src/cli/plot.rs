@@ -301,7 +301,8 @@ fn printed(unit: &str) -> String {
         let end = word.trim_end_matches(|c: char| c.is_ascii_digit() || c == '-' || c == '+');
         let (base, exponent) = (end.trim_end_matches('^'), &word[end.len()..]);
         match exponent.parse() {
-            Ok(exponent) if base.chars().last().is_some_and(char::is_alphabetic) => {
+            // 1e-3 is a number.
+            Ok(exponent) if base.ends_with(char::is_alphabetic) && !base.starts_with(|c: char| c.is_ascii_digit()) => {
                 format!("{base}{}", superscript(exponent))
             }
             _ => word,
