@@ -36,8 +36,10 @@ impl Jobs {
 
     /// Does all of some tasks, several at a time, and begins them in their order; the results are in that order too.
     pub(crate) fn run<T: Sync, R: Send>(&self, tasks: &[T], each: impl Fn(&T) -> R + Sync) -> Vec<R> {
-        return_at_once();
         let threads = self.jobs.map_or_else(rayon::current_num_threads, usize::from).clamp(1, tasks.len().max(1));
+        if threads > 1 {
+            return_at_once();
+        }
         let next = AtomicUsize::new(0);
         let work = || {
             let mut done = Vec::new();
@@ -63,13 +65,18 @@ impl Jobs {
 /// Memory that the program takes without any map: its libraries, and what the allocators of several threads keep.
 const PROGRAM: u64 = 32 << 20;
 
+/// Arrays of so many bytes are mapped by themselves: maps, and not what is made and dropped all the time while windows
+/// are summed.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const MAPPED: libc::c_int = 1 << 24;
+
 /// Has large arrays returned to the system when they are freed. GNU's allocator would come to keep them, a heap for each
 /// thread, so that maps took more than the sum of theirs.
 fn return_at_once() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: the function only sets from which size on arrays are mapped by themselves.
     unsafe {
-        libc::mallopt(libc::M_MMAP_THRESHOLD, 1 << 20);
+        libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED);
     }
 }
 
