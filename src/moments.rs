@@ -94,6 +94,10 @@ impl Layout {
     #[inline(always)]
     fn rows_of(&self, groups: &Range<usize>) -> [Range<usize>; 2] {
         let (first, step) = (self.first_rank - self.groups * self.plain, 2 * self.ranks.len());
+        if self.groups == 1 && !groups.is_empty() {
+            // They follow one another.
+            return [first..self.rows, self.rows..self.rows];
+        }
         [
             first + groups.start * self.plain..first + groups.end * self.plain,
             self.first_rank + groups.start * step..self.first_rank + groups.end * step,
@@ -277,6 +281,9 @@ impl Sink for Gather<'_> {
         let part = 1.0 / cell.count as f64;
         let mut moments = std::mem::take(&mut self.cell);
         for rows in self.layout.rows_of(&std::mem::take(&mut self.touched)) {
+            if rows.is_empty() {
+                continue;
+            }
             for (c, &pixel) in cell.pixels[..cell.count].iter().enumerate() {
                 if let Some((data, len)) = self.target(cell, pixel) {
                     for (row, moments) in rows.clone().zip(&moments[rows.clone()]) {
