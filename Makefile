@@ -51,10 +51,11 @@ licences: ## check that no dependency forces a GPL licence on longan
 		NF && (!free || $$1 ~ /GPL.* AND | AND .*GPL/) { print "licence refused: " $$2 " has \"" $$1 "\""; bad = 1 } \
 		END { exit bad }'
 
-bench: setup ## compare longan's speed with that of its peers (NSIDE=512), and plugins with built-ins
+bench: setup ## compare longan's speed with that of its peers (NSIDE=512), plugins with built-ins, many maps with one
 	cargo build --release --workspace $(CARGOFLAGS)
 	python=$$(tools/setup python) && "$${python:-python3}" benches/peers.py $(NSIDE)
 	python3 benches/plugins.py
+	python3 benches/ensemble.py
 	@if command -v cdo >/dev/null && command -v nccopy >/dev/null; then python3 benches/regrid.py; \
 	else echo "bench: no cdo or nccopy, so regridding is not compared with it" >&2; fi
 

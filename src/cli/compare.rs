@@ -52,8 +52,8 @@ Examples:
   longan compare maps/sky.fits maps/sim*.fits -o deviation.fits --scatter 264,-17 evq,rank4-mid
   longan compare sky.fits sims/*.fits -o deviation.fits --work work/ --window 10 --mask mask.fits
 
-Inputs are Minkowski maps of longan, all made in the same way, of any ordering; their masks may differ. With --work they
-are maps of any kind, of which Minkowski maps are made first, by the options of `longan map`, in that folder; those that
+Inputs are Minkowski maps of longan, all made in the same way, of any ordering; their masks may differ. With --work they \
+are maps of any kind, of which Minkowski maps are made first, by the options of `longan map`, in that folder; those that \
 it holds already, made by the same options, are not made again. Direction measures are angles and are not compared.")]
 pub(crate) struct Arguments {
     /// File of the data: a Minkowski map; with --work a map.

@@ -47,7 +47,7 @@ Examples:
   longan graph rain.nc -o rain.png --thresholds log:0.1:100:31 --select time=#0
   longan graph sky.fits -o graph.csv --thresholds -200:200:81
 
-With thresholds in sigma (the default) each map's are counted from its own mean, in its own standard deviation, those of
+With thresholds in sigma (the default) each map's are counted from its own mean, in its own standard deviation, those of \
 an ensemble too. A field with several times has a curve for each, in an ensemble each is a simulation.")]
 #[command(mut_arg("thresholds", |arg| arg.help("Thresholds: n from lo to hi, evenly or logarithmically spaced, or a list \
 [default: -4:4:33 in sigma]")))]

@@ -38,7 +38,7 @@ Examples:
   longan map stations.csv -o evq.fits --variable rain --gather gaussian:5
   longan map cell.ply -o evq.fits --variable signal --window 15
 
-FITS opens in healpy: healpy.read_map('evq.fits'); masked and undefined pixels are UNSEEN. NetCDF opens in xarray;
+FITS opens in healpy: healpy.read_map('evq.fits'); masked and undefined pixels are UNSEEN. NetCDF opens in xarray; \
 they are NaN there. A field with several times makes an extension each, in NetCDF an axis of time.
 
 Of several inputs each is mapped whatever becomes of the others. An output is there only when it is complete: after any \
