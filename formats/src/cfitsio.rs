@@ -484,12 +484,15 @@ impl FitsWriter {
         })
     }
 
-    /// Appends a header entry of text of any length.
+    /// Appends a header entry of text of any length. The lines are made here, since cfitsio's own function for long
+    /// texts never ends for some of them.
     pub(crate) fn write_text(&mut self, key: &str, value: &str, comment: &str) -> Result<(), Error> {
-        let (key, value, comment) = (c_text(key), c_text(value), c_text(comment));
-        // SAFETY: the handle is open for writing; all texts are C strings.
-        write("write a header entry", |status| unsafe {
-            sys::ffpkls(self.handle.0, key.as_ptr(), value.as_ptr(), comment.as_ptr(), status);
+        text_cards(key, value, comment).iter().try_for_each(|card| {
+            let card = c_text(card);
+            // SAFETY: the handle is open for writing; the card is a C string.
+            write("write a header entry", |status| unsafe {
+                sys::ffprec(self.handle.0, card.as_ptr(), status);
+            })
         })
     }
 
@@ -551,5 +554,67 @@ impl FitsWriter {
                 status,
             );
         })
+    }
+}
+/// Bytes of a header's line.
+const CARD: usize = 80;
+
+/// Bytes of text on a line that another follows.
+const PART: usize = 67;
+
+/// The lines of an entry of text (FITS standard 4.0, section 4.2.1.2): quotes are doubled, and each line ends in `&` where
+/// another follows.
+fn text_cards(key: &str, value: &str, comment: &str) -> Vec<String> {
+    let mut parts = vec![String::new()];
+    for letter in value.chars().map(|c| if c == '\'' { "''".to_owned() } else { c.to_string() }) {
+        match parts.last_mut() {
+            Some(part) if part.len() + letter.len() <= PART => *part += &letter,
+            _ => parts.push(letter),
+        }
+    }
+    let last = parts.len() - 1;
+    let card = |(i, part): (usize, &String)| {
+        let start = if i == 0 { format!("{key:<8}= ") } else { "CONTINUE  ".to_owned() };
+        match i == last {
+            false => format!("{start}'{part}&'"),
+            true => {
+                // A text takes eight letters at least, and comments stand in a column.
+                let text = format!("'{part:<8}'");
+                let mut card = format!("{start}{text:<20}");
+                let room = CARD.saturating_sub(card.len() + 3);
+                if room > 0 && !comment.is_empty() {
+                    card += " / ";
+                    card.extend(comment.chars().take(room));
+                }
+                card
+            }
+        }
+    };
+    parts.iter().enumerate().map(card).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_of_any_length_are_put_on_lines() {
+        for length in 0..300 {
+            for quote in [2, 3, 7, 1000] {
+                let value: String = (0..length).map(|i| if i % quote == quote - 1 { '\'' } else { 'x' }).collect();
+                let cards = text_cards("COMMAND", &value, "what was done");
+                let mut read = String::new();
+                for (i, card) in cards.iter().enumerate() {
+                    assert!(card.len() <= CARD, "{card}");
+                    assert!(card.starts_with(if i == 0 { "COMMAND = '" } else { "CONTINUE  '" }), "{card}");
+                    let end = if i + 1 == cards.len() { card.rfind('\'').unwrap() } else { card.len() - 2 };
+                    assert!(i + 1 == cards.len() || card.ends_with("&'"), "{card}");
+                    read += card[11..end].trim_end();
+                }
+                assert_eq!(read.replace("''", "'"), value);
+            }
+        }
+        assert_eq!(text_cards("BODY", "above", "side"), ["BODY    = 'above   '           / side"]);
+        assert_eq!(text_cards("INUNIT", "", "unit"), ["INUNIT  = '        '           / unit"]);
     }
 }
