@@ -13,7 +13,7 @@ use crate::moments::{Layout, Selection, Weight};
 use crate::region::Region;
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{ThresholdError, Thresholds};
-use crate::totals::{Regional, Totals, totals, totals_within};
+use crate::totals::{Regional, Totals, totals_within};
 use crate::window::{self, Moments, MovingWindows, Summation, Ways, Windows};
 
 /// What thresholds are counted in.
@@ -300,8 +300,10 @@ impl Analysis {
             true => thresholds.values().iter().map(|&t| Thresholds::new(vec![t])).collect::<Result<_, _>>()?,
             false => vec![thresholds.clone()],
         };
-        let evaluate = |batch: &[Moments], values: &mut [f64]| {
-            let masked = |m: &Moments| m.masked_fraction >= 1.0 || m.masked_fraction > self.max_masked;
+        let evaluate = |batch: &mut [Moments], values: &mut [f64]| {
+            batch.iter_mut().for_each(|moments| moments.scale_up(self.weight));
+            let masked =
+                |m: &Moments| m.masked_fraction >= 1.0 || m.lost_edges >= 1.0 || m.masked_fraction > self.max_masked;
             let unmasked = batch.iter().enumerate().filter(|(_, moments)| !masked(moments));
             let (places, windows): (Vec<usize>, Vec<Window<'_>>) =
                 unmasked.map(|(i, m)| (i, self.window_of(m, &selection.ranks))).unzip();
@@ -334,15 +336,15 @@ impl Analysis {
         Ok(maps.collect())
     }
 
-    /// Area, length and curvature of the whole unmasked sphere for each threshold, with the thresholds in the map's
-    /// unit, and the area of masked cells in steradian. Window, weight and output grid do not matter.
+    /// Area, length and curvature of the whole unmasked sphere for each threshold, curvature made up for the edges beside
+    /// masked cells, with the thresholds in the map's unit, and the area of masked cells in steradian. Window, weight and
+    /// output grid do not matter.
     ///
     /// # Errors
     /// See [`thresholds_of`](Self::thresholds_of).
     pub fn totals(&self, map: &Map) -> Result<(Thresholds, Vec<Totals>, f64), AnalysisError> {
-        let (thresholds, _) = self.thresholds_of(map)?;
-        let (totals, masked) = totals(&Field::new(map.grid(), map.values(), &thresholds, self.body));
-        Ok((thresholds, totals, masked))
+        let (thresholds, whole) = self.totals_within(map, None)?;
+        Ok((thresholds, whole.made_up(), whole.masked))
     }
 
     /// The same over a region, or over the sphere.

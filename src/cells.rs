@@ -56,13 +56,23 @@ impl Stencil {
     /// [`count`](Self::count) are meant.
     #[inline(always)]
     pub fn pixels(&self, sector: usize) -> [Pixel; 4] {
-        self.corners.map(|c| {
-            let mut column = c.column + sector * c.per_sector;
-            if column >= c.len {
-                column -= c.len;
-            }
-            Pixel { ring: c.ring, column, index: c.start + column }
-        })
+        self.corners.map(|corner| corner.pixel(sector))
+    }
+}
+
+impl Corner {
+    #[inline(always)]
+    fn pixel(&self, sector: usize) -> Pixel {
+        let mut column = self.column + sector * self.per_sector;
+        if column >= self.len {
+            column -= self.len;
+        }
+        Pixel { ring: self.ring, column, index: self.start + column }
+    }
+
+    /// The pixel to the west, which may lie in the sector before.
+    fn west(self) -> Self {
+        Corner { column: (self.column + self.len - 1) % self.len, ..self }
     }
 }
 
@@ -148,6 +158,65 @@ impl CellRing {
         let ring = self.near[SAME].ring;
         let meridian = (2 * k + 1 + usize::from(ring.shifted)) as f64 * (PI / ring.len as f64);
         Stencil { corners, count, meridian }
+    }
+
+    /// The cells beyond the edges of a stencil's copy in this sector, each by its ring and its place there. An edge has
+    /// the number of its first corner; a triangle has no fourth.
+    pub(crate) fn beyond(&self, stencil: &Stencil, sector: usize) -> [Option<(usize, usize)>; 4] {
+        let (n, i, count) = (self.nside, self.ring, stencil.count);
+        let is_pole = i == 0 || i == 4 * n;
+        std::array::from_fn(|edge| {
+            let (from, to) = (stencil.corners[edge], stencil.corners[(edge + 1) % count]);
+            let west = stencil.corners[0];
+            // Two pixels share a side; the cells at its ends are this one and that beyond, which is here found as the
+            // one east of a pixel.
+            let east_of = match (from.ring == i, to.ring == i) {
+                _ if edge >= count => return None,
+                // About a pole, of the western of two pixels.
+                _ if is_pole => {
+                    if i == 0 {
+                        from
+                    } else {
+                        to
+                    }
+                }
+                // Of two pixels on different rings, that cell lies west or east of the one on the other ring.
+                (true, false) => {
+                    if from == west {
+                        to.west()
+                    } else {
+                        to
+                    }
+                }
+                (false, true) => {
+                    if to == west {
+                        from.west()
+                    } else {
+                        from
+                    }
+                }
+                // Both are on the next ring from the pole: the cell between them there.
+                (false, false) => {
+                    if i < n {
+                        from
+                    } else {
+                        to
+                    }
+                }
+                // Both are on this ring, at a boundary of base pixels in a cap: the cell between them nearer the pole,
+                // or the pole's.
+                (true, true) => {
+                    let (side, pole) = if i <= n { (NORTH, 0) } else { (SOUTH, 4 * n) };
+                    let Near { number, ring, per_sector } = self.near[side];
+                    if number == i {
+                        return Some((pole, 0));
+                    }
+                    Corner { ring: number, column: per_sector - 1, per_sector, len: ring.len, start: ring.start }
+                }
+            };
+            let Pixel { ring, column, .. } = east_of.pixel(sector);
+            Some((ring, column))
+        })
     }
 
     /// The geometry of a stencil, in a frame turned about the pole so that the cell's vertex lies at φ = 0.
@@ -236,6 +305,18 @@ impl Geometry {
         self.corner[edge].cross(self.along[edge][0])
     }
 
+    /// Directions of the edge at its first corner and at the next, as (cos ϕ, sin ϕ) with ϕ counted from south towards
+    /// east. Transport along the edge takes the one to the other.
+    #[inline]
+    pub(crate) fn directions(&self, edge: usize) -> [(f64, f64); 2] {
+        let corners = [edge, self.next(edge)];
+        std::array::from_fn(|end| {
+            let (c, along, frames) = (corners[end], self.along[edge][end], &self.frames);
+            let south = along.x * frames.south[0][c] + along.y * frames.south[1][c] + along.z * frames.south[2][c];
+            (south, along.x * frames.east[0][c] + along.y * frames.east[1][c])
+        })
+    }
+
     /// Area of the cell in steradian.
     pub fn area(&self) -> f64 {
         let [a, b, c, d] = self.corner;
@@ -309,6 +390,32 @@ mod tests {
             let total: f64 = cells.iter().map(|c| c.1).sum();
             assert!((total - 4.0 * PI).abs() < 1e-11, "Nside {nside}: {total}");
             assert!(cells.iter().all(|c| c.1 > 0.0), "Nside {nside}: a cell turned inside out");
+        }
+    }
+
+    #[test]
+    fn the_cell_beyond_an_edge_has_that_edge_too() {
+        for nside in [1, 2, 3, 4, 5, 8, 21] {
+            let grid = Healpix::new(nside).unwrap();
+            let edges_of = |(i, column): (usize, usize)| {
+                let ring = CellRing::new(grid, i);
+                let (sector, k) = (column / ring.stencils, column % ring.stencils);
+                let stencil = ring.stencil(k);
+                let n = stencil.count();
+                let pixels = stencil.pixels(sector).map(|p| p.index);
+                let beyond = ring.beyond(&stencil, sector);
+                assert_eq!(beyond.iter().flatten().count(), n);
+                (0..n).map(|e| ([pixels[e], pixels[(e + 1) % n]], beyond[e].unwrap())).collect::<Vec<_>>()
+            };
+            for i in 0..=4 * nside {
+                let cells = if i % (4 * nside) == 0 { 1 } else { grid.ring(i).len };
+                for cell in (0..cells).map(|column| (i, column)) {
+                    for ([from, to], beyond) in edges_of(cell) {
+                        let back = edges_of(beyond).into_iter().find(|(edge, _)| *edge == [to, from]);
+                        assert_eq!(back.map(|b| b.1), Some(cell), "Nside {nside}: {cell:?}, edge {from}, {to}");
+                    }
+                }
+            }
         }
     }
 

@@ -9,10 +9,11 @@ use std::ops::Range;
 
 use glam::DVec3;
 use longan_formats::Healpix;
+use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::angles;
-use crate::cells::{CellRing, Geometry, Pixel, Point, area_of_triangle};
+use crate::cells::{CellRing, Geometry, Pixel, Point, Stencil, area_of_triangle};
 use crate::thresholds::Thresholds;
 use crate::transport::{self, Phases};
 
@@ -72,14 +73,60 @@ impl<'a> Field<'a> {
 
     /// The bins of the pixels that are corners of cells on these cell rings, and the first of these pixels.
     fn bins(&self, cells: &Range<usize>) -> (usize, Vec<u16>) {
-        let last = self.grid.ring(cells.end.min(self.grid.rings()));
-        let first = self.grid.ring(cells.start.saturating_sub(1).max(1)).start;
+        let (first, last) = self.corner_rings(cells);
+        let (first, last) = (self.grid.ring(first).start, self.grid.ring(last));
         let values = &self.values[first..last.start + last.len];
         let mut bins = vec![0; values.len()];
         for (values, bins) in values.chunks(BINNED).zip(bins.chunks_mut(BINNED)) {
             sort_into_bins(values, self.thresholds, bins);
         }
         (first, bins)
+    }
+
+    /// The first and the last pixel ring with corners of cells on these cell rings.
+    fn corner_rings(&self, cells: &Range<usize>) -> (usize, usize) {
+        (cells.start.saturating_sub(1).max(1), cells.end.min(self.grid.rings()))
+    }
+}
+
+/// Which cells have masked corners, on the cell rings gone through and the one beside these on either side.
+struct MaskedCells {
+    /// The first of these cell rings.
+    first: usize,
+    /// For each ring, for each cell.
+    rings: Vec<Vec<bool>>,
+}
+
+impl MaskedCells {
+    /// Nothing where no cell of these rings has a masked corner.
+    fn find(field: &Field<'_>, rings: &Range<usize>) -> Option<Self> {
+        let past = 4 * field.grid.nside() + 1;
+        let around = rings.start.saturating_sub(1)..(rings.end + 1).min(past);
+        let (first, last) = field.corner_rings(&around);
+        let (from, last) = (field.grid.ring(first).start, field.grid.ring(last));
+        if !field.values[from..last.start + last.len].iter().any(|value| value.is_nan()) {
+            return None;
+        }
+        let of_ring = |i| {
+            let ring = CellRing::new(field.grid, i);
+            let mut masked = vec![false; ring.stencils * ring.sectors];
+            for k in 0..ring.stencils {
+                let stencil = ring.stencil(k);
+                for sector in 0..ring.sectors {
+                    // A triangle's fourth corner repeats its first.
+                    let pixels = stencil.pixels(sector);
+                    masked[sector * ring.stencils + k] = pixels.iter().any(|p| field.values[p.index].is_nan());
+                }
+            }
+            masked
+        };
+        Some(MaskedCells { first: around.start, rings: around.map(of_ring).collect() })
+    }
+
+    /// Beyond which edges of a cell there is a masked cell.
+    fn beyond(&self, ring: &CellRing, stencil: &Stencil, sector: usize) -> [bool; 4] {
+        let is_masked = |(ring, column): (usize, usize)| self.rings[ring - self.first][column];
+        ring.beyond(stencil, sector).map(|cell| cell.is_some_and(is_masked))
     }
 }
 
@@ -107,6 +154,17 @@ pub struct Cell<'a> {
     pub pixels: &'a [Pixel; 4],
     /// Number of corners, 4 or 3.
     pub count: usize,
+    /// Edges beyond which the cell is masked, each with the number of its first corner; none where the sink does not
+    /// [want](Sink::wants_edges) them.
+    pub masked_beyond: [bool; 4],
+}
+
+impl Cell<'_> {
+    /// The corner at which an edge ends.
+    #[inline(always)]
+    pub fn next(&self, edge: usize) -> usize {
+        if edge + 1 == self.count { 0 } else { edge + 1 }
+    }
 }
 
 /// Where the contour crosses an edge.
@@ -126,6 +184,8 @@ pub struct Segment<'a> {
     to: Crossing,
     /// Sine of the length.
     sin: f64,
+    /// Whether the body is above the threshold.
+    above: bool,
     /// Unit normal, at right angles to the whole segment, out of the body.
     pub normal: DVec3,
 }
@@ -135,8 +195,9 @@ impl<'a> Segment<'a> {
     fn new(geometry: &'a Geometry, from: Crossing, to: Crossing, body: Body) -> Self {
         let cross = to.point.at.cross(from.point.minus(&to.point));
         let sin = cross.length();
-        let normal = cross * (if body == Body::Above { 1.0 } else { -1.0 } / sin);
-        Segment { geometry, from, to, sin, normal }
+        let above = body == Body::Above;
+        let normal = cross * (if above { 1.0 } else { -1.0 } / sin);
+        Segment { geometry, from, to, sin, above, normal }
     }
 
     /// Length in radians.
@@ -163,14 +224,62 @@ impl<'a> Segment<'a> {
         transport::to_corners(self.normal, midpoint, midpoint.length(), self.geometry)
     }
 
-    /// The part of the contour's total curvature that belongs to this segment: the angles, at both ends, between
-    /// the contour and the perpendicular of the crossed edge. Two cells share each crossing's exterior angle.
-    pub fn turn(&self) -> f64 {
-        let end = |crossing: &Crossing| {
+    /// Its parts of the exterior angles at both ends.
+    #[inline(always)]
+    pub fn ends_at(&self) -> [End<'a>; 2] {
+        let end = |crossing: &Crossing, leaves: bool| {
             let inward = self.geometry.inward(crossing.edge);
-            self.normal.dot(inward).atan2(crossing.point.at.cross(self.normal).dot(inward).abs())
+            End {
+                geometry: self.geometry,
+                edge: crossing.edge,
+                sign: if leaves == self.above { 1.0 } else { -1.0 },
+                sin: self.normal.dot(inward),
+                cos: crossing.point.at.cross(self.normal).dot(inward).abs(),
+            }
         };
-        end(&self.from) + end(&self.to)
+        [end(&self.from, true), end(&self.to, false)]
+    }
+}
+
+/// A segment's part of the exterior angle at a vertex of the contour, where it crosses an edge into the next cell.
+///
+/// With the body on the left the exterior angle goes from the normal of the arriving segment to that of the leaving one.
+/// Each of both cells has the part between its segment's normal and the edge's direction out of the body. A vertex
+/// belongs to its edge, half to each of the edge's two pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct End<'a> {
+    geometry: &'a Geometry,
+    /// The edge, with the number of its first corner; it ends at the next.
+    pub edge: usize,
+    /// 1 where the segment begins here, −1 where it ends. Also 1 where the edge runs out of the body, −1 where it runs
+    /// into it.
+    sign: f64,
+    /// Sine and cosine of the part.
+    sin: f64,
+    cos: f64,
+}
+
+impl End<'_> {
+    /// The part of the exterior angle in radians.
+    #[inline(always)]
+    pub fn angle(&self) -> f64 {
+        self.sin.atan2(self.cos)
+    }
+
+    /// At both corners of the edge, e^{iϕ} of the edge's direction out of the body and of the segment's normal, after
+    /// transport along the edge: the bounds of the normal cone's part.
+    #[inline(always)]
+    pub fn cone(&self) -> [Complex64; 4] {
+        // Transport along a geodesic keeps the angle to it.
+        let turn = Complex64::new(self.cos, self.sign * self.sin) / self.cos.hypot(self.sin);
+        let [first, next] = self.geometry.directions(self.edge).map(|(cos, sin)| Complex64::new(cos, sin) * self.sign);
+        [first, next, first * turn, next * turn]
+    }
+
+    /// The sign of the integral over the cone from the edge's direction to the normal.
+    #[inline(always)]
+    pub fn sign(&self) -> f64 {
+        self.sign
     }
 }
 
@@ -178,6 +287,8 @@ impl<'a> Segment<'a> {
 pub trait Sink {
     /// Whether [`inside`](Self::inside) and [`area`](Self::area) are wanted.
     fn wants_area(&self) -> bool;
+    /// Whether it matters which [cells beyond edges](Cell::masked_beyond) are masked.
+    fn wants_edges(&self) -> bool;
     /// A cell with a masked corner, which contributes nothing else; its area in steradian, if wanted.
     fn masked(&mut self, cell: Cell<'_>, area: f64);
     /// A cell that lies wholly in the body at these thresholds, and its area in steradian.
@@ -198,6 +309,7 @@ pub trait Sink {
 #[inline(always)]
 pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
     let (first, bins_of) = field.bins(&rings);
+    let masked_cells = if sink.wants_edges() { MaskedCells::find(field, &rings) } else { None };
     for i in rings {
         let ring = CellRing::new(field.grid, i);
         let mut known: Option<(Geometry, f64)> = None;
@@ -208,7 +320,6 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
             }
             for sector in 0..ring.sectors {
                 let pixels = stencil.pixels(sector);
-                let cell = Cell { ring: i, pixels: &pixels, count: stencil.count() };
                 let bins = pixels.map(|p| bins_of[p.index - first]);
                 // A triangle's fourth corner repeats its first.
                 let lo = bins[0].min(bins[1]).min(bins[2].min(bins[3]));
@@ -216,6 +327,11 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
                 if lo == hi && hi != MASKED && !sink.wants_area() {
                     continue;
                 }
+                let masked_beyond = match &masked_cells {
+                    Some(cells) => cells.beyond(&ring, &stencil, sector),
+                    None => [false; 4],
+                };
+                let cell = Cell { ring: i, pixels: &pixels, count: stencil.count(), masked_beyond };
                 let (geometry, area) = known.get_or_insert_with(|| {
                     let geometry = ring.geometry(&stencil);
                     let area = if sink.wants_area() { geometry.area() } else { 0.0 };

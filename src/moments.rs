@@ -1,14 +1,20 @@
 //! Moments of body and contour, gathered at the pixels.
 //!
-//! A cell's moments are shared equally among its corners, each share transported from the segment's midpoint to that
-//! pixel's centre: ψ_s = Σ L e^{isϕ} with ϕ the angle of the contour's normal there. All thresholds are summed, or each
-//! is kept by itself; dividing by their number, and summing pixels to windows, is left to [`crate::window`].
+//! A cell's area and length are shared equally among its corners, each share transported from the segment's midpoint to
+//! that pixel's centre: ψ_s = Σ L e^{isϕ} with ϕ the angle of the contour's normal there. Curvature sits at the vertices
+//! of the contour: a vertex goes half to each of the two pixels whose edge it lies on, with the integral ∫ e^{isϕ} dϕ over
+//! its exterior angle for ψ_s. (A cell alone knows only its part of that angle, which is of order 1 and cancels against its
+//! neighbour's only where both go to the same pixels.) A vertex beside a masked cell has no exterior angle and counts
+//! nothing; how many edges are so lost is counted too.
+//!
+//! All thresholds are summed, or each is kept by itself; dividing by their number, and summing pixels to windows, is left
+//! to [`crate::window`].
 
 use std::ops::Range;
 
 use crate::cells::Pixel;
 use crate::contour::{Cell, Field, Segment, Sink, march};
-use crate::transport::Powers;
+use crate::transport::{Phases, Powers};
 
 pub use longan_measures::Weight;
 
@@ -31,12 +37,15 @@ pub struct Selection {
 
 /// Where each selected quantity stands among the rows of a ring.
 ///
-/// The shares that are masked come first, then for each group of thresholds the plain rows, W0 to W2, then for each group
+/// The shares that are masked come first, and the edges lost, then for each group of thresholds the plain rows, W0 to W2, then for each group
 /// those of ψ_s. A group is one threshold where these are kept by themselves, else there is one group of them all.
 #[derive(Clone, Debug)]
 pub struct Layout {
     /// Cell shares that are masked, of the four that each pixel has. Absent where nothing is masked.
     pub masked: Option<usize>,
+    /// Edges beside masked cells, of the four that each pixel has. Absent where nothing is masked or no curvature is
+    /// selected.
+    pub lost_edges: Option<usize>,
     /// W0 of the first group; [`plain`](Self::plain) rows further on that of the next, as for the following.
     pub area: Option<usize>,
     /// W1.
@@ -66,12 +75,15 @@ impl Layout {
             rows += usize::from(wanted);
             wanted.then(|| rows - 1)
         };
-        let (masked, area) = (row(masked), row(selection.area));
-        let (length, curvature) = (row(selection.length), row(selection.curvature));
-        let plain = rows - usize::from(masked.is_some());
+        let by_curvature = selection.weight == Weight::Curvature && !selection.ranks.is_empty();
+        let lost_edges = masked && (selection.curvature || by_curvature);
+        let (masked, lost_edges) = (row(masked), row(lost_edges));
+        let (area, length, curvature) = (row(selection.area), row(selection.length), row(selection.curvature));
+        let plain = rows - [masked, lost_edges].iter().flatten().count();
         let first_rank = rows + (groups - 1) * plain;
         Layout {
             masked,
+            lost_edges,
             area,
             length,
             curvature,
@@ -104,6 +116,18 @@ impl Layout {
         ]
     }
 
+    /// Whether there are moments ψ_s, s ≥ 1, weighted by curvature.
+    #[inline(always)]
+    fn is_by_curvature(&self) -> bool {
+        self.weight == Weight::Curvature && !self.ranks.is_empty()
+    }
+
+    /// The row of Re ψ_s of a group's first rank.
+    #[inline(always)]
+    fn psi_of(&self, group: usize) -> usize {
+        self.first_rank + 2 * self.ranks.len() * group
+    }
+
     /// The group of a threshold.
     #[inline(always)]
     fn group(&self, threshold: usize) -> usize {
@@ -111,7 +135,7 @@ impl Layout {
     }
 }
 
-/// Cell shares of a pixel: it is a corner of four cells.
+/// Cell shares of a pixel, which is a corner of four cells; and its edges, one to each pixel that it shares a side with.
 pub const SHARES: usize = 4;
 
 /// Moments at the pixels of one ring, a row for each quantity.
@@ -194,30 +218,61 @@ impl Gather<'_> {
     }
 
     #[inline(always)]
-    fn add(&mut self, segment: &Segment<'_>, group: usize) {
+    fn add(&mut self, cell: Cell<'_>, segment: &Segment<'_>, group: usize) {
         let layout = self.layout;
-        let by_length = layout.weight == Weight::Length && !layout.ranks.is_empty();
-        let by_turn = layout.weight == Weight::Curvature && !layout.ranks.is_empty();
-        let length = if layout.length.is_some() || by_length { segment.length() } else { 0.0 };
-        let turn = if layout.curvature.is_some() || by_turn { segment.turn() } else { 0.0 };
-        let cell = &mut self.cell;
-        for (row, value) in [(layout.length, length), (layout.curvature, turn)] {
-            if let Some(row) = row {
-                let row = row + group * layout.plain;
-                cell[row] = cell[row].map(|a| a + value);
-            }
+        if layout.curvature.is_some() || layout.is_by_curvature() {
+            self.add_curvature(cell, segment, group);
         }
-        if layout.ranks.is_empty() {
+        let by_length = layout.weight == Weight::Length && !layout.ranks.is_empty();
+        if layout.length.is_none() && !by_length {
             return;
         }
-        let weight = if by_length { length } else { turn };
+        let length = segment.length();
+        let rows = &mut self.cell;
+        if let Some(row) = layout.length {
+            let row = row + group * layout.plain;
+            rows[row] = rows[row].map(|a| a + length);
+        }
+        if !by_length {
+            return;
+        }
         let mut powers = Powers::new(segment.directions());
-        let first = layout.first_rank + 2 * layout.ranks.len() * group;
-        for (rows, &rank) in cell[first..].chunks_exact_mut(2).zip(&layout.ranks) {
+        for (rows, &rank) in rows[layout.psi_of(group)..].chunks_exact_mut(2).zip(&layout.ranks) {
             let power = powers.raise(rank);
             for c in 0..4 {
-                rows[0][c] += weight * power.re[c];
-                rows[1][c] += weight * power.im[c];
+                rows[0][c] += length * power.re[c];
+                rows[1][c] += length * power.im[c];
+            }
+        }
+    }
+
+    /// Adds the segment's parts of the exterior angles at its ends.
+    #[inline(always)]
+    fn add_curvature(&mut self, cell: Cell<'_>, segment: &Segment<'_>, group: usize) {
+        let layout = self.layout;
+        // Half to each pixel of the edge, where all else is divided by the number of corners.
+        let half = cell.count as f64 / 2.0;
+        for end in segment.ends_at() {
+            let corners = [end.edge, cell.next(end.edge)];
+            if cell.masked_beyond[end.edge] {
+                continue;
+            }
+            if let Some(row) = layout.curvature {
+                let angle = half * end.angle();
+                corners.iter().for_each(|&c| self.cell[row + group * layout.plain][c] += angle);
+            }
+            if !layout.is_by_curvature() {
+                continue;
+            }
+            // ∫ e^{isϕ} dϕ from the edge's direction ε to the normal ν is (e^{isν} − e^{isε})/(is).
+            let mut powers = Powers::new(Phases::from(end.cone()));
+            for (rows, &rank) in self.cell[layout.psi_of(group)..].chunks_exact_mut(2).zip(&layout.ranks) {
+                let power = powers.raise(rank);
+                let weight = half * end.sign() / f64::from(rank);
+                for (i, &c) in corners.iter().enumerate() {
+                    rows[0][c] += weight * (power.im[i + 2] - power.im[i]);
+                    rows[1][c] -= weight * (power.re[i + 2] - power.re[i]);
+                }
             }
         }
     }
@@ -228,11 +283,27 @@ impl Sink for Gather<'_> {
         self.layout.area.is_some()
     }
 
+    fn wants_edges(&self) -> bool {
+        self.layout.lost_edges.is_some()
+    }
+
     fn masked(&mut self, cell: Cell<'_>, _: f64) {
-        let Some(row) = self.layout.masked else { return };
-        for &pixel in &cell.pixels[..cell.count] {
+        let Layout { masked, lost_edges, .. } = *self.layout;
+        let mut add = |row: usize, corner: usize, value: f64| {
+            let pixel = cell.pixels[corner];
             if let Some((data, len)) = self.target(cell, pixel) {
-                data[row * len + pixel.column] += 1.0;
+                data[row * len + pixel.column] += value;
+            }
+        };
+        for corner in 0..cell.count {
+            if let Some(row) = masked {
+                add(row, corner, 1.0);
+            }
+            if let Some(row) = lost_edges {
+                // An edge between two masked cells is met twice.
+                let edge = if cell.masked_beyond[corner] { 0.5 } else { 1.0 };
+                add(row, corner, edge);
+                add(row, cell.next(corner), edge);
             }
         }
     }
@@ -254,12 +325,12 @@ impl Sink for Gather<'_> {
     }
 
     #[inline(always)]
-    fn contour(&mut self, _: Cell<'_>, threshold: usize, segments: &[Segment<'_>]) {
+    fn contour(&mut self, cell: Cell<'_>, threshold: usize, segments: &[Segment<'_>]) {
         let group = self.layout.group(threshold);
         self.touch(group..group + 1);
         let [one, other] = segments else {
             for segment in segments {
-                self.add(segment, group);
+                self.add(cell, segment, group);
             }
             return;
         };
@@ -267,8 +338,8 @@ impl Sink for Gather<'_> {
         let rows = self.layout.rows_of(&(group..group + 1));
         let so_far = rows.clone().map(|rows| self.cell[rows].to_vec());
         rows.iter().for_each(|rows| self.cell[rows.clone()].fill([0.0; 4]));
-        self.add(one, group);
-        self.add(other, group);
+        self.add(cell, one, group);
+        self.add(cell, other, group);
         for (rows, so_far) in rows.into_iter().zip(so_far) {
             for (row, so_far) in self.cell[rows].iter_mut().zip(so_far) {
                 row.iter_mut().zip(so_far).for_each(|(a, b)| *a += b);

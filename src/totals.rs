@@ -15,7 +15,7 @@ pub struct Totals {
     pub area: f64,
     /// W1, the contour's length in radians.
     pub length: f64,
-    /// W2, the contour's total curvature in radians.
+    /// W2, the contour's total curvature in radians, without that at edges beside masked cells, where it is not known.
     pub curvature: f64,
 }
 
@@ -34,40 +34,48 @@ impl Totals {
 /// Totals over the sphere or a region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Regional {
-    /// For each threshold, in the field's order.
+    /// For each threshold, in the field's order, as they stand: parts of the sphere add up to the whole.
     pub totals: Vec<Totals>,
     /// Area of the cells without masked corners, in steradian.
     pub unmasked: f64,
     /// Area of the other cells, in steradian.
     pub masked: f64,
+    /// Area of the unmasked cells, as far as it belongs to edges beside masked cells, in steradian. A cell's area belongs
+    /// to its edges in equal parts.
+    pub lost: f64,
 }
 
-/// Totals for each threshold, in the field's order, and the area of masked cells in steradian.
+impl Regional {
+    /// Totals over the unmasked cells, W2 made up for the edges beside masked cells. Nothing is known of it where all edges
+    /// are.
+    pub fn made_up(&self) -> Vec<Totals> {
+        let curvature = |raw: f64| if self.lost > 0.0 { raw * self.unmasked / (self.unmasked - self.lost) } else { raw };
+        self.totals.iter().map(|t| Totals { curvature: curvature(t.curvature), ..*t }).collect()
+    }
+}
+
+/// Totals as they stand for each threshold, in the field's order, and the area of masked cells in steradian.
 pub fn totals(field: &Field<'_>) -> (Vec<Totals>, f64) {
-    let whole = sum(field, |_| 1.0);
+    let whole = sum(field, None);
     (whole.totals, whole.masked)
 }
 
 /// Totals over the pixels of a region, or over the sphere. A cell gives equal shares to its corners, as in windows, and
 /// the shares of those count whose centre lies in the region. So parts of the sphere add up to the whole.
 pub fn totals_within(field: &Field<'_>, region: Option<&Region>) -> Regional {
-    let Some(region) = region else { return sum(field, |_| 1.0) };
-    let pixels = region.pixels(field.grid());
-    sum(field, |cell| {
-        let corners = &cell.pixels[..cell.count];
-        corners.iter().filter(|pixel| pixels[pixel.index]).count() as f64 / cell.count as f64
-    })
+    let pixels = region.map(|region| region.pixels(field.grid()));
+    sum(field, pixels.as_deref())
 }
 
-/// Sums over all cells, each as much as `share` says.
-fn sum(field: &Field<'_>, share: impl Fn(Cell<'_>) -> f64 + Sync) -> Regional {
+/// Sums over all cells, or over the shares of these pixels.
+fn sum(field: &Field<'_>, pixels: Option<&[bool]>) -> Regional {
     let past = 4 * field.grid().nside() + 1;
-    let nothing = Regional { totals: vec![Totals::default(); field.thresholds()], unmasked: 0.0, masked: 0.0 };
+    let nothing =
+        Regional { totals: vec![Totals::default(); field.thresholds()], unmasked: 0.0, masked: 0.0, lost: 0.0 };
     let chunks: Vec<Vec<Regional>> = (0..past.div_ceil(CHUNK))
         .into_par_iter()
         .map(|i| {
-            let mut sink =
-                ByRing { share: &share, ring: nothing.clone(), empty: nothing.clone(), finished: Vec::new() };
+            let mut sink = ByRing { pixels, ring: nothing.clone(), empty: nothing.clone(), finished: Vec::new() };
             march(field, i * CHUNK..((i + 1) * CHUNK).min(past), &mut sink);
             sink.finished
         })
@@ -82,6 +90,7 @@ fn sum(field: &Field<'_>, share: impl Fn(Cell<'_>) -> f64 + Sync) -> Regional {
         }
         all.unmasked += ring.unmasked;
         all.masked += ring.masked;
+        all.lost += ring.lost;
     }
     all
 }
@@ -90,37 +99,60 @@ fn sum(field: &Field<'_>, share: impl Fn(Cell<'_>) -> f64 + Sync) -> Regional {
 const CHUNK: usize = 32;
 
 /// Totals of the present ring, and of those finished.
-struct ByRing<'a, S> {
-    /// How much of a cell counts.
-    share: &'a S,
+struct ByRing<'a> {
+    /// The pixels whose shares count; without, all do.
+    pixels: Option<&'a [bool]>,
     ring: Regional,
     empty: Regional,
     finished: Vec<Regional>,
 }
 
-impl<S: Fn(Cell<'_>) -> f64> Sink for ByRing<'_, S> {
+impl ByRing<'_> {
+    /// How much of what these corners of a cell share in equal parts counts.
+    fn share(&self, cell: Cell<'_>, corners: &[usize]) -> f64 {
+        let Some(pixels) = self.pixels else { return 1.0 };
+        let within = corners.iter().filter(|&&corner| pixels[cell.pixels[corner].index]);
+        within.count() as f64 / corners.len() as f64
+    }
+
+    fn share_of_cell(&self, cell: Cell<'_>) -> f64 {
+        self.share(cell, &[0, 1, 2, 3][..cell.count])
+    }
+}
+
+impl Sink for ByRing<'_> {
     fn wants_area(&self) -> bool {
         true
     }
 
+    fn wants_edges(&self) -> bool {
+        true
+    }
+
     fn masked(&mut self, cell: Cell<'_>, area: f64) {
-        self.ring.masked += (self.share)(cell) * area;
+        self.ring.masked += self.share_of_cell(cell) * area;
     }
 
     fn inside(&mut self, cell: Cell<'_>, thresholds: Range<usize>, area: f64) {
-        let area = (self.share)(cell) * area;
+        for edge in (0..cell.count).filter(|&edge| cell.masked_beyond[edge]) {
+            self.ring.lost += self.share(cell, &[edge, cell.next(edge)]) * area / cell.count as f64;
+        }
+        let area = self.share_of_cell(cell) * area;
         self.ring.unmasked += area;
         self.ring.totals[thresholds].iter_mut().for_each(|t| t.area += area);
     }
 
     fn area(&mut self, cell: Cell<'_>, threshold: usize, area: f64) {
-        self.ring.totals[threshold].area += (self.share)(cell) * area;
+        self.ring.totals[threshold].area += self.share_of_cell(cell) * area;
     }
 
     fn contour(&mut self, cell: Cell<'_>, threshold: usize, segments: &[Segment<'_>]) {
-        let (share, totals) = ((self.share)(cell), &mut self.ring.totals[threshold]);
+        let share = self.share_of_cell(cell);
+        let ends = segments.iter().flat_map(Segment::ends_at).filter(|end| !cell.masked_beyond[end.edge]);
+        let curvature: f64 = ends.map(|end| self.share(cell, &[end.edge, cell.next(end.edge)]) * end.angle()).sum();
+        let totals = &mut self.ring.totals[threshold];
         totals.length += share * segments.iter().map(Segment::length).sum::<f64>();
-        totals.curvature += share * segments.iter().map(Segment::turn).sum::<f64>();
+        totals.curvature += curvature;
     }
 
     fn cell_finished(&mut self, _: Cell<'_>) {}

@@ -85,6 +85,12 @@ impl<const N: usize> Default for Phases<N> {
     }
 }
 
+impl<const N: usize> From<[Complex64; N]> for Phases<N> {
+    fn from(phases: [Complex64; N]) -> Self {
+        Phases { re: phases.map(|phase| phase.re), im: phases.map(|phase| phase.im) }
+    }
+}
+
 impl<const N: usize> Phases<N> {
     #[inline(always)]
     fn multiply(&mut self, by: &Self) {

@@ -48,6 +48,8 @@ pub struct Moments {
     pub centre: (f64, f64),
     /// Share of the window's cells that are masked; 1 for a window without pixels.
     pub masked_fraction: f64,
+    /// Share of the edges of the window's pixels that lie beside a masked cell; 0 where no curvature is selected.
+    pub lost_edges: f64,
     /// W0 in steradian; 0 unless selected, as the following.
     pub area: f64,
     /// W1 in radians.
@@ -56,6 +58,22 @@ pub struct Moments {
     pub curvature: f64,
     /// ψ_s for the ranks selected.
     pub psi: Vec<Complex64>,
+}
+
+impl Moments {
+    /// Makes up for what is masked: every extensive quantity is divided by the unmasked share of the window, that of
+    /// cells, or for curvature, which sits on the edges, that of edges. `weight` is that of ψ_s.
+    pub(crate) fn scale_up(&mut self, weight: Weight) {
+        let (cells, edges) = (1.0 - self.masked_fraction, 1.0 - self.lost_edges);
+        self.area /= cells;
+        self.length /= cells;
+        self.curvature /= edges;
+        let share = match weight {
+            Weight::Length => cells,
+            Weight::Curvature => edges,
+        };
+        self.psi.iter_mut().for_each(|psi| *psi /= share);
+    }
 }
 
 /// How windows are summed.
@@ -132,7 +150,7 @@ impl MovingWindows<'_> {
         visit: impl Fn(&Moments, &mut [f64]) + Sync,
         progress: impl FnMut(f64),
     ) -> Vec<Windows> {
-        let each = |batch: &[Moments], values: &mut [f64]| {
+        let each = |batch: &mut [Moments], values: &mut [f64]| {
             batch.iter().zip(values.chunks_exact_mut(columns)).for_each(|(moments, values)| visit(moments, values));
             Ok::<(), Infallible>(())
         };
@@ -153,7 +171,7 @@ impl MovingWindows<'_> {
     pub fn visit_batches<E: Send>(
         &self,
         columns: usize,
-        visit: impl Fn(&[Moments], &mut [f64]) -> Result<(), E> + Sync,
+        visit: impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E> + Sync,
         mut progress: impl FnMut(f64),
     ) -> Result<Vec<Windows>, E> {
         let input = self.field.grid();
@@ -253,7 +271,7 @@ impl<'a> Sweep<'a> {
     fn visit_finished<E: Send>(
         &mut self,
         end: usize,
-        visit: &(impl Fn(&[Moments], &mut [f64]) -> Result<(), E> + Sync),
+        visit: &(impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E> + Sync),
     ) -> Result<(), E> {
         let Windows { columns, ways } = &mut self.windows;
         while self.groups.front().is_some_and(|group| group.reach.end <= end) {
@@ -371,7 +389,7 @@ fn visited<E>(
     layout: &Layout,
     thresholds: usize,
     columns: usize,
-    visit: impl Fn(&[Moments], &mut [f64]) -> Result<(), E>,
+    visit: impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E>,
 ) -> Result<Vec<f64>, E> {
     // `columns` are those of all groups of thresholds.
     let (groups, columns) = (layout.groups, columns / layout.groups);
@@ -390,6 +408,10 @@ fn visited<E>(
                 (0, _) => 1.0,
                 (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
                 (_, None) => 0.0,
+            };
+            moments.lost_edges = match (sums.pixels[k], layout.lost_edges) {
+                (0, _) | (_, None) => 0.0,
+                (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
             };
             moments.area = selected(layout.area);
             moments.length = selected(layout.length);

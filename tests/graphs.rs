@@ -105,7 +105,7 @@ fn skies_are_on_the_mean_as_the_analytic_curves() {
             let ensemble = Gaussian { mean: 0.0, sigma0: waves.sigma0(), sigma1: waves.sigma1() };
             let itself = Gaussian::of(map).unwrap();
             for (t, &threshold) in thresholds.values().iter().enumerate() {
-                let seen = regional.totals[t].per_area(regional.unmasked);
+                let seen = regional.made_up()[t].per_area(regional.unmasked);
                 for (gaussian, all) in [(ensemble, &mut of_ensemble), (itself, &mut of_itself)] {
                     let expected = gaussian.per_area(threshold, body);
                     all[t][0].push(seen.area - expected.area);

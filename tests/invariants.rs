@@ -128,11 +128,13 @@ fn a_map_turned_by_90_degrees_gives_the_same_to_the_last_bit() {
             let at = thresholds(&[1.0, 2.5, 3.0]);
             for (output, radius) in [(nside, 0.0), (nside, 20.0), (4, 35.0), (3, 180.0), (64, 40.0)] {
                 let summation = if output == 64 { Summation::default() } else { Summation::Exact };
-                let run = |map: &Map| moments_by(summation, map, &at, Body::Above, output, radius, Weight::Length);
-                let (here, there) = (run(&map), run(&turned(&map)));
-                for (a, b) in here.iter().zip(there) {
-                    let a = turned(&Map::new("", a.clone()).unwrap());
-                    assert_eq!(a.values(), b, "Nside {nside} to {output}, {radius}°");
+                for weight in [Weight::Length, Weight::Curvature] {
+                    let run = |map: &Map| moments_by(summation, map, &at, Body::Above, output, radius, weight);
+                    let (here, there) = (run(&map), run(&turned(&map)));
+                    for (a, b) in here.iter().zip(there) {
+                        let a = turned(&Map::new("", a.clone()).unwrap());
+                        assert_eq!(a.values(), b, "Nside {nside} to {output}, {radius}°, {weight:?}");
+                    }
                 }
             }
         }
@@ -230,7 +232,9 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn masked_windows_are_masked_and_others_rescaled() {
     let map = masked(&Waves::new(10.0, 4).unwrap().map(Healpix::new(32).unwrap()), |p| p % 97 < 3 || p < 500);
-    let measures = ["w1", "contour-length", "masked-fraction", "psi2"].map(|name| find(name).unwrap());
+    let names =
+        ["w1", "contour-length", "masked-fraction", "psi2", "evq", "trace", "rank4-min", "rank4-mid", "rank4-max"];
+    let measures = names.map(|name| find(name).unwrap());
     let with = |max_masked| {
         let analysis =
             Analysis { windows: vec![15.0], threshold_unit: ThresholdUnit::Sigma, max_masked, ..Analysis::default() };
@@ -245,6 +249,13 @@ fn masked_windows_are_masked_and_others_rescaled() {
             continue;
         }
         assert!((all[0][p] * (1.0 - fraction[p]) - all[1][p]).abs() < 1e-12);
+        // Every measure sees the same moments.
+        let [w1, psi2, evq, trace] = [all[0][p], all[3][p], all[4][p], all[5][p]];
+        if evq.is_finite() {
+            assert!(((w1 - psi2) / (w1 + psi2) * evq - 1.0).abs() < 1e-12);
+        }
+        let eigenvalues: f64 = (6..9).map(|row| all[row][p]).sum();
+        assert!((eigenvalues - trace).abs() < 1e-12);
         for row in 0..4 {
             assert_eq!(some[row][p].is_nan(), fraction[p] > 0.2 || all[row][p].is_nan());
         }

@@ -75,6 +75,54 @@ fn a_smooth_cap_is_round() {
     }
 }
 
+/// What the continuum says of a great circle, in every window that it crosses: no curvature. Between pixels, the distance
+/// from it is linear but for its third derivative, and so is the sine of that, with a larger one; so contours turn by what
+/// vanishes with the pixels' area.
+#[test]
+fn a_great_circle_has_no_curvature_in_any_window() {
+    let worst = |nside: usize, axis: [f64; 3], field: fn(f64) -> f64| {
+        let grid = Healpix::new(nside).unwrap();
+        let height = |p: usize| {
+            let (theta, phi) = grid.centre(p);
+            field(axis[0] * theta.sin() * phi.cos() + axis[1] * theta.sin() * phi.sin() + axis[2] * theta.cos())
+        };
+        let map = Map::new("", (0..grid.pixels()).map(height).collect()).unwrap();
+        let measures = ["w2", "w1"].map(|name| find(name).unwrap());
+        let analysis = Analysis { windows: vec![6.0], nside_out: Some(64), ..at(0.0) };
+        let maps = analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0);
+        assert!(maps.values[1].iter().filter(|length| **length > 0.1).count() > 1000);
+        maps.values[0].iter().fold(0.0, |worst: f64, w2| worst.max(w2.abs()))
+    };
+    for axis in [[0.48, -0.6, 0.64], [0.36, 0.48, 0.8], [-0.8, 0.6, 0.0], [0.28, 0.768, 0.576]] {
+        for (nside, bound) in [(64, 5e-5), (128, 1.25e-5), (256, 3.2e-6)] {
+            let worst = worst(nside, axis, f64::asin);
+            assert!(worst < bound, "{axis:?}, Nside {nside}: {worst:e}");
+        }
+        let [coarse, fine] = [64, 256].map(|nside| worst(nside, axis, |height| height));
+        assert!(coarse < 2e-4 && fine < coarse / 8.0, "{axis:?}: {coarse:e}, then {fine:e}");
+    }
+}
+
+/// Tensors weighted by curvature: a cap is round, ever more so at rising resolution.
+#[test]
+fn the_curvature_of_a_smooth_cap_is_round() {
+    let analysis = |nside: usize| Analysis {
+        windows: vec![40.0],
+        weight: longan::Weight::Curvature,
+        nside_out: Some(nside),
+        ..at(0.0)
+    };
+    for (lon, lat) in [(33.0, 12.0), (100.0, 55.0)] {
+        for (nside, bound) in [(64, 1e-3), (128, 3e-4)] {
+            let map = shapes(Healpix::new(nside).unwrap(), &[solid(Shape::Cap, lon, lat, 40.0)], Edge::Smooth);
+            let q = there(&map, &analysis(nside), &["q1", "q2", "q3", "q4", "evq"], (lon, lat));
+            // The window's centre is that of a pixel, not the cap's.
+            assert!(q[1..4].iter().all(|q| q.abs() < bound), "Nside {nside}: {q:?}");
+            assert!((q[4] - 1.0).abs() < 3.0 * bound, "Nside {nside}: {q:?}");
+        }
+    }
+}
+
 #[test]
 fn a_triangle_has_only_every_third_moment() {
     let map = shapes(Healpix::new(512).unwrap(), &[solid(Shape::Triangle, 0.0, 10.0, 4.0)], Edge::Smooth);

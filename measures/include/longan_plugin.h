@@ -47,7 +47,7 @@ typedef struct LonganComplex {
   double im;
 } LonganComplex;
 
-// The moments of one window, the mean over the thresholds. Nothing is rescaled for masked cells.
+// The moments of one window, the mean over the thresholds, made up for what is masked.
 typedef struct LonganWindow {
   // Colatitude of the centre in degrees.
   double colatitude;

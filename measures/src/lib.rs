@@ -81,7 +81,10 @@ pub enum Origin {
     Plugin(String),
 }
 
-/// The moments of one window, the mean over the thresholds. Nothing is rescaled for masked cells.
+/// The moments of one window, the mean over the thresholds.
+///
+/// Areas, lengths and ψ_s are those of the whole window: what is masked has been made up for, once, by division by
+/// 1 − `masked_fraction`, curvatures by their own share.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Window<'a> {
     /// Colatitude and longitude of the centre in degrees.
@@ -112,11 +115,6 @@ impl Window<'_> {
             0 => self.psi0.into(),
             _ => self.psi[self.ranks.binary_search(&rank).expect("a rank that the measure needs")],
         }
-    }
-
-    /// An extensive quantity, scaled up from the unmasked part of the window to the whole.
-    pub fn rescaled(&self, value: f64) -> f64 {
-        value / (1.0 - self.masked_fraction)
     }
 }
 

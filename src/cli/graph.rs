@@ -412,7 +412,7 @@ impl Plan {
             let (_, regional) = analysis.totals_within(map, self.region.as_ref())?;
             ensure!(regional.unmasked + regional.masked > 0.0, Nothing::NoPixel);
             ensure!(regional.unmasked > 0.0, Nothing::Masked);
-            per_area = regional.totals.iter().map(|totals| totals.per_area(regional.unmasked)).collect();
+            per_area = regional.made_up().iter().map(|totals| totals.per_area(regional.unmasked)).collect();
             area = Some(regional.unmasked);
         }
         let maps = match self.measures.is_empty() {

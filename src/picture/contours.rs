@@ -71,6 +71,10 @@ impl Sink for Collect<'_, '_> {
         false
     }
 
+    fn wants_edges(&self) -> bool {
+        false
+    }
+
     fn masked(&mut self, _: Cell<'_>, _: f64) {}
 
     fn inside(&mut self, _: Cell<'_>, _: Range<usize>, _: f64) {}

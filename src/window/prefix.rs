@@ -140,7 +140,7 @@ fn sample(block: &Block<'_>) -> Vec<RingTransport> {
 
 /// Plain rows, of one group of thresholds: costs are compared for one, and so all are summed in the way of one alone.
 fn plain_rows(layout: &Layout) -> f64 {
-    (layout.plain + usize::from(layout.masked.is_some())) as f64
+    (layout.plain + [layout.masked, layout.lost_edges].iter().flatten().count()) as f64
 }
 
 /// Nanoseconds, about, that adding the block to a quadrant takes directly.

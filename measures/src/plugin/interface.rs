@@ -40,7 +40,7 @@ pub struct LonganComplex {
     pub im: f64,
 }
 
-/// The moments of one window, the mean over the thresholds. Nothing is rescaled for masked cells.
+/// The moments of one window, the mean over the thresholds, made up for what is masked.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct LonganWindow {
