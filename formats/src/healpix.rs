@@ -71,7 +71,11 @@ impl Healpix {
     /// # Errors
     /// [`Error::Nside`] for 0 or more than [`NSIDE_MAX`].
     pub fn new(nside: usize) -> Result<Self, Error> {
-        if (1..=NSIDE_MAX).contains(&nside) { Ok(Healpix { nside }) } else { Err(Error::Nside { nside }) }
+        if (1..=NSIDE_MAX).contains(&nside) {
+            Ok(Healpix { nside })
+        } else {
+            Err(Error::Nside { nside })
+        }
     }
 
     /// The grid that has this many pixels, if there is one.

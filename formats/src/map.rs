@@ -42,32 +42,6 @@ impl CoordinateSystem {
     }
 }
 
-/// What the sphere of a map is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Sphere {
-    /// The sky, seen from inside: what HEALPix in FITS is unless it says otherwise, and all with a celestial
-    /// [`CoordinateSystem`].
-    #[default]
-    Sky,
-    /// The Earth, or another globe of latitudes and longitudes.
-    Earth,
-    /// A body seen from its middle.
-    Body,
-}
-
-/// A time, as the file has it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Time {
-    /// The value of the time coordinate.
-    pub value: f64,
-    /// Its unit, such as `days since 1979-01-01`.
-    pub units: String,
-    /// Its calendar, as CF names it.
-    pub calendar: String,
-    /// The date in ISO 8601, as far as it is not all zero: `1997-12-01` or `1997-12-01T06:00`.
-    pub label: String,
-}
-
 /// A scalar field on a HEALPix grid, in RING order. A pixel is masked exactly if its value is NaN.
 #[derive(Clone, Debug)]
 pub struct Map {
@@ -79,14 +53,8 @@ pub struct Map {
     pub unit: Option<String>,
     /// The coordinate system, where the file names one.
     pub coordinates: Option<CoordinateSystem>,
-    /// What the sphere is.
-    pub sphere: Sphere,
     /// The ordering of the file that the map was read from (the values here are always in RING order).
     pub ordering: Ordering,
-    /// The time of the field, where the file has one.
-    pub time: Option<Time>,
-    /// What the field is in words (`long_name`), where the file says it.
-    pub long_name: Option<String>,
 }
 
 impl Map {
@@ -101,33 +69,7 @@ impl Map {
                 *v = f64::NAN;
             }
         }
-        Ok(Map {
-            grid,
-            values,
-            name: name.into(),
-            unit: None,
-            coordinates: None,
-            sphere: Sphere::default(),
-            ordering: Ordering::Ring,
-            time: None,
-            long_name: None,
-        })
-    }
-
-    /// A map of values in RING order in which nothing but NaN means "no value"; one value for each pixel.
-    pub(crate) fn from_masked(grid: Healpix, values: Vec<f64>) -> Self {
-        debug_assert_eq!(values.len(), grid.pixels());
-        Map {
-            grid,
-            values,
-            name: String::new(),
-            unit: None,
-            coordinates: None,
-            sphere: Sphere::default(),
-            ordering: Ordering::Ring,
-            time: None,
-            long_name: None,
-        }
+        Ok(Map { grid, values, name: name.into(), unit: None, coordinates: None, ordering: Ordering::Ring })
     }
 
     /// The grid.
@@ -138,16 +80,6 @@ impl Map {
     /// The values in RING order, NaN where masked.
     pub fn values(&self) -> &[f64] {
         &self.values
-    }
-
-    /// The values alone.
-    pub fn into_values(self) -> Vec<f64> {
-        self.values
-    }
-
-    /// The share of pixels that have a value.
-    pub(crate) fn share_valid(&self) -> f64 {
-        self.values.iter().filter(|v| !v.is_nan()).count() as f64 / self.values.len() as f64
     }
 
     /// Masks every pixel at which `mask` is below `threshold` or is itself masked.

@@ -2,8 +2,7 @@
 //!
 //! A [`Measure`] says which moments it [needs](Measure::needs) and turns one window's moments into a number; how the
 //! moments come about is the engine's affair. The built-ins stand in [`BUILT_INS`], one file an idea, with their
-//! formulas; [`find`] makes one from its name. A [`Formula`] is a measure written as a text, [`plugin`] loads measures
-//! from libraries, and a [`Catalogue`] knows them all by name. `ψ_s = Σ L e^{isϕ}` are the moments of Collischon et al. 2024,
+//! formulas; [`find`] makes one from its name. `ψ_s = Σ L e^{isϕ}` are the moments of Collischon et al. 2024,
 //! "Morphometry on the sphere", Commun. Phys. 7.
 //!
 //! ```
@@ -17,12 +16,9 @@
 //! # Ok::<(), longan_measures::UnknownMeasure>(())
 //! ```
 
-mod catalogue;
 mod coverage;
-mod formula;
 mod functionals;
 mod irreducible;
-pub mod plugin;
 mod rank2;
 mod rank4;
 mod registry;
@@ -30,19 +26,7 @@ pub mod testing;
 
 use num_complex::Complex64;
 
-pub use catalogue::{Catalogue, CatalogueError, split};
-pub use formula::{Formula, FormulaError};
 pub use registry::{BUILT_INS, BuiltIn, Kind, UnknownMeasure, find};
-
-/// What the contour's pieces weigh in the moments ψ_s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Weight {
-    /// Their length: ψ_s of the tensors W_1^{0,s}.
-    #[default]
-    Length,
-    /// Their turn: ψ_s of the curvature-weighted tensors W_2^{0,s}.
-    Curvature,
-}
 
 /// Which moments of a window a measure needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -53,38 +37,11 @@ pub struct Needs {
     pub length: bool,
     /// W2, the contour's total curvature.
     pub curvature: bool,
-    /// Ranks s of the moments ψ_s, 0 among them, ascending.
+    /// Ranks s of the moments ψ_s, 0 among them.
     pub ranks: Vec<u32>,
-    /// The weight of the moments ψ_s that the measure is defined for; `None`: either.
-    pub weight: Option<Weight>,
 }
 
-/// Why a measure could not be evaluated. That it is not defined for a window is no error.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the measure '{measure}' failed: {reason}")]
-pub struct MeasureError {
-    /// The measure's name.
-    pub measure: String,
-    /// What it says about it.
-    pub reason: String,
-}
-
-/// Where a measure comes from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Origin {
-    /// The program itself.
-    #[default]
-    Program,
-    /// A formula, with its text.
-    Formula(String),
-    /// A plugin, with its name, version and file.
-    Plugin(String),
-}
-
-/// The moments of one window, the mean over the thresholds.
-///
-/// Areas, lengths and ψ_s are those of the whole window: what is masked has been made up for, once, by division by
-/// 1 − `masked_fraction`, curvatures by their own share.
+/// The moments of one window, the mean over the thresholds. Nothing is rescaled for masked cells.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Window<'a> {
     /// Colatitude and longitude of the centre in degrees.
@@ -116,6 +73,11 @@ impl Window<'_> {
             _ => self.psi[self.ranks.binary_search(&rank).expect("a rank that the measure needs")],
         }
     }
+
+    /// An extensive quantity, scaled up from the unmasked part of the window to the whole.
+    pub fn rescaled(&self, value: f64) -> f64 {
+        value / (1.0 - self.masked_fraction)
+    }
 }
 
 /// A number that characterises the shape in a window.
@@ -138,24 +100,8 @@ pub trait Measure: Send + Sync {
     /// The measure of one window, in its [unit](Self::unit); `None` where it is not defined.
     fn evaluate(&self, window: &Window<'_>) -> Option<f64>;
 
-    /// The measure of many windows, each as [`evaluate`](Self::evaluate) has it; NaN where it is not defined.
-    ///
-    /// # Errors
-    /// Where the measure itself fails, as one from a plugin may.
-    fn evaluate_all(&self, windows: &[Window<'_>], values: &mut [f64]) -> Result<(), MeasureError> {
-        for (value, window) in values.iter_mut().zip(windows) {
-            *value = self.evaluate(window).unwrap_or(f64::NAN);
-        }
-        Ok(())
-    }
-
     /// The name of its column in a file: `EVQ_DIRECTION`.
     fn column(&self) -> String {
-        self.name().to_uppercase().replace(['-', ':'], "_")
-    }
-
-    /// Where it comes from.
-    fn origin(&self) -> Origin {
-        Origin::Program
+        self.name().to_uppercase().replace('-', "_")
     }
 }
