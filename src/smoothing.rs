@@ -101,7 +101,7 @@ impl Smoothing {
         if !(fwhm > 0.0 && fwhm <= 180.0) {
             return Err(SmoothingError::Width { degrees: fwhm });
         }
-        let pixel = (4.0 * PI / grid.pixels() as f64).sqrt().to_degrees();
+        let pixel = grid.pixel_side().to_degrees();
         let least = PIXELS_PER_FWHM * pixel;
         if fwhm < least {
             return Err(SmoothingError::Narrow { degrees: fwhm, nside: grid.nside(), least });

@@ -18,7 +18,7 @@ use crate::map::Time;
 use crate::netcdf::Netcdf;
 use crate::ply::SurfacePly;
 use crate::zarr::{self, ZarrStore};
-use crate::{Card, CardValue, CoordinateSystem, Error, Healpix, Map, Ordering};
+use crate::{Card, CardValue, CoordinateSystem, Error, Healpix, Map, Ordering, Regridded};
 
 /// The field of a file that is to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,12 +87,14 @@ pub enum Place {
 /// How fields on other grids, or at points, are brought to HEALPix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Regrid {
-    /// From grids of longitude and latitude.
-    pub method: Method,
+    /// From grids of longitude and latitude; unless given, [`Method::Bilinear`] where pixels are finer than the grid by
+    /// more than [`FINER`](crate::FINER), and [`Method::Conservative`] where they are not.
+    pub method: Option<Method>,
     /// Pixels with a smaller share of valid values than this are masked.
     pub min_valid: f64,
-    /// From points.
-    pub gather: Gather,
+    /// From points; unless given, [`Gather::Gaussian`] of twice the typical distance between points where pixels are finer
+    /// than that by more than [`FINER`](crate::FINER), and [`Gather::Mean`] where they are not.
+    pub gather: Option<Gather>,
     /// Pixels whose centre is farther than this from any point, in degrees, are masked; unless given, twice the typical
     /// distance between points, which is the median distance to the fourth nearest neighbour (coincident points count
     /// once).
@@ -106,9 +108,9 @@ pub struct Regrid {
 impl Default for Regrid {
     fn default() -> Self {
         Regrid {
-            method: Method::default(),
+            method: None,
             min_valid: 0.5,
-            gather: Gather::default(),
+            gather: None,
             reach: None,
             centre: None,
             allow_folds: false,
@@ -117,10 +119,9 @@ impl Default for Regrid {
 }
 
 /// How a field on a grid of longitude and latitude is brought to HEALPix.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// The mean over the pixel, from the areas that grid cells and pixel share.
-    #[default]
     Conservative,
     /// Interpolated between the four grid points about the pixel's centre.
     Bilinear,
@@ -129,10 +130,9 @@ pub enum Method {
 }
 
 /// How values at points make a map.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gather {
     /// The mean of the points in a pixel; the nearest point where there is none.
-    #[default]
     Mean,
     /// The mean of all points, weighted by a Gaussian of this full width at half maximum in degrees.
     Gaussian {
@@ -172,6 +172,14 @@ pub trait Maps {
 
     /// What they take; nothing where that does not show before one is read.
     fn room(&self) -> Option<Room>;
+
+    /// How the maps come to HEALPix, where their field is on another grid or at points. A map that is read has it too.
+    ///
+    /// # Errors
+    /// Where settings are missing or impossible.
+    fn regridded(&self) -> Result<Option<Regridded>, Error> {
+        Ok(None)
+    }
 
     /// Reads one map. What the steps share, such as weights, is computed once.
     ///

@@ -12,7 +12,7 @@ use crate::columns::{self, Column, shown};
 use crate::directions::{self, FARTHEST, at, from_centre};
 use crate::points::Samples;
 use crate::{
-    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad,
+    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Regridded, Room, Selection, Sphere, Time, UNSEEN, is_bad,
 };
 
 /// What may part cells.
@@ -86,6 +86,10 @@ struct One {
 impl Maps for One {
     fn times(&self) -> &[Time] {
         &[]
+    }
+
+    fn regridded(&self) -> Result<Option<Regridded>, Error> {
+        Ok(Some(self.samples.plan(self.nside, &self.regrid)?.regridded))
     }
 
     fn room(&self) -> Option<Room> {

@@ -3,7 +3,7 @@
 //! How values become a map is left to [`crate::points`] and [`crate::surface`].
 
 use std::collections::HashSet;
-use std::f64::consts::{FRAC_PI_3, PI};
+use std::f64::consts::PI;
 
 use rayon::prelude::*;
 use rstar::RTree;
@@ -137,9 +137,7 @@ pub(crate) fn spacing(places: &RTree<Numbered>) -> Option<f64> {
 /// The Nside, a power of two, of the pixels whose size is closest to a distance; no finer than the finest that is used
 /// unasked.
 pub(crate) fn closest_nside(spacing: f64) -> usize {
-    // A pixel is as large as a square with sides of this angle.
-    let pixel_of_nside_1 = FRAC_PI_3.sqrt();
-    let depth = (pixel_of_nside_1 / spacing).log2().round();
+    let depth = (Healpix::BASE.pixel_side() / spacing).log2().round();
     1 << (depth.clamp(0.0, f64::from(FINEST.ilog2())) as u32)
 }
 
@@ -224,7 +222,7 @@ mod tests {
     #[test]
     fn the_pixel_closest_to_a_spacing() {
         for nside in [1usize, 2, 64, 1024] {
-            let size = (4.0 * PI / (12 * nside * nside) as f64).sqrt();
+            let size = Healpix::new(nside).unwrap().pixel_side();
             for factor in [0.72, 1.0, 1.4] {
                 let expected = if nside == 1024 && factor < 1.0 { 1024 } else { nside };
                 assert_eq!(closest_nside(size * factor), expected);

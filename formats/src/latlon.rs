@@ -7,9 +7,10 @@ use std::rc::Rc;
 
 use crate::cf::{self, Horizontal};
 use crate::dataset::{Dataset, Kind, Variable};
+use crate::regridded;
 use crate::{
-    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Room, Selection, Sphere,
-    TableDescription, Time, Weights,
+    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Regridded, Room, Selection,
+    Sphere, TableDescription, Time, Weights,
 };
 
 /// Lists name at most this many variables.
@@ -40,8 +41,10 @@ pub(crate) fn open(dataset: Rc<dyn Dataset>, selection: &Selection) -> Result<Bo
     let chosen = cf::select(&*dataset, &dataset.variables()[variable], &sphere, &selection.at)?;
     let (from, _, _) = grid(&*dataset, &horizontal)?;
     let to = Healpix::new(selection.nside.unwrap_or_else(|| from.nside_closest()))?;
-    let selection = selection.clone();
-    Ok(Box::new(Series { dataset, variable, horizontal, chosen, from, to, weights: None, selection }))
+    let (method, regridded) = regridded::method(&from, to, selection.regrid.method);
+    let min_valid = selection.regrid.min_valid;
+    let weights = None;
+    Ok(Box::new(Series { dataset, variable, horizontal, chosen, from, to, method, regridded, min_valid, weights }))
 }
 
 /// What a dataset holds on grids of latitude and longitude.
@@ -61,9 +64,11 @@ struct Series {
     chosen: cf::Chosen,
     from: LatLon,
     to: Healpix,
+    method: Method,
+    regridded: Regridded,
+    min_valid: f64,
     /// Computed when the first map is read.
     weights: Option<Weights>,
-    selection: Selection,
 }
 
 impl Maps for Series {
@@ -71,9 +76,13 @@ impl Maps for Series {
         self.chosen.times()
     }
 
+    fn regridded(&self) -> Result<Option<Regridded>, Error> {
+        Ok(Some(self.regridded))
+    }
+
     fn room(&self) -> Option<Room> {
         let (values, pixels) = (self.from.values() as f64, self.to.pixels() as f64);
-        let weights = match self.selection.regrid.method {
+        let weights = match self.method {
             // Cells of a grid that lies askew on another.
             Method::Conservative => (values.sqrt() + pixels.sqrt()).powi(2),
             Method::Bilinear => 4.0 * pixels,
@@ -86,18 +95,18 @@ impl Maps for Series {
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {
         let values = self.values(step)?;
-        let regrid = &self.selection.regrid;
         let weights = match &mut self.weights {
             Some(weights) => weights,
-            none => none.insert(Weights::new(&self.from, self.to, regrid.method)?),
+            none => none.insert(Weights::new(&self.from, self.to, self.method)?),
         };
-        let mut map = Map::from_masked(self.to, weights.apply(&values, regrid.min_valid));
+        let mut map = Map::from_masked(self.to, weights.apply(&values, self.min_valid));
         let variable = &self.dataset.variables()[self.variable];
         map.name.clone_from(&variable.name);
         map.unit = variable.text("units").map(str::to_owned);
         map.long_name = variable.text("long_name").map(str::to_owned);
         map.time = self.times().get(step).cloned();
         map.sphere = Sphere::Earth;
+        map.regridded = Some(self.regridded);
         Ok(map)
     }
 

@@ -26,6 +26,7 @@ mod netcdf_write;
 mod ply;
 mod points;
 mod regrid;
+mod regridded;
 mod save;
 mod surface;
 mod zarr;
@@ -42,4 +43,5 @@ pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixL
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Sphere, Time, UNSEEN, is_bad};
 pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
 pub use regrid::{LatLon, Weights};
+pub use regridded::{FINER, Regridded, Way};
 pub use save::{abandon, check_writable, save, tidy};

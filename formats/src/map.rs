@@ -1,6 +1,6 @@
 //! The map type that every adapter fills and the engine reads.
 
-use crate::{Error, Healpix, Ordering};
+use crate::{Error, Healpix, Ordering, Regridded};
 
 /// HEALPix's marker for "no value here".
 pub const UNSEEN: f64 = -1.6375e30;
@@ -87,6 +87,8 @@ pub struct Map {
     pub time: Option<Time>,
     /// What the field is in words (`long_name`), where the file says it.
     pub long_name: Option<String>,
+    /// How the field came to HEALPix, where it was on another grid or at points.
+    pub regridded: Option<Regridded>,
 }
 
 impl Map {
@@ -111,6 +113,7 @@ impl Map {
             ordering: Ordering::Ring,
             time: None,
             long_name: None,
+            regridded: None,
         })
     }
 
@@ -127,6 +130,7 @@ impl Map {
             ordering: Ordering::Ring,
             time: None,
             long_name: None,
+            regridded: None,
         }
     }
 

@@ -5,10 +5,10 @@
 use std::collections::HashMap;
 use std::f64::consts::{LN_2, PI};
 
-use rstar::PointDistance;
+use rstar::{PointDistance, RTree};
 
-use crate::directions::{Direction, angle, chart, chord, closest_nside, nearest, pixel_at, places, spacing, tree};
-use crate::{CoordinateSystem, Error, Gather, GridDescription, Healpix, Map, Regrid};
+use crate::directions::{Direction, Numbered, angle, chart, chord, closest_nside, nearest, pixel_at, places, spacing, tree};
+use crate::{CoordinateSystem, Error, Gather, GridDescription, Healpix, Map, Regrid, Regridded, regridded};
 
 /// A Gaussian is cut at this many standard deviations, where its weight is 1.5e-8, below the rounding of
 /// single-precision values.
@@ -16,6 +16,30 @@ const CUT: f64 = 6.0;
 
 /// Pixels farther than this many times the typical distance from any point are masked, unless a reach is given.
 const REACH: f64 = 2.0;
+
+/// Where pixels are finer than points lie, they are smoothed by a Gaussian of this many times the typical distance, unless
+/// another way is asked for. Among points at random, contours of a field that varies little from one to the next become
+/// 1.6 % too long; 3 % at 1.5 times the distance.
+pub(crate) const SMOOTH: f64 = 2.0;
+
+/// How samples become a map.
+pub(crate) struct Plan {
+    /// The places of the samples.
+    places: RTree<Numbered>,
+    grid: Healpix,
+    /// Pixels farther than this from any place are masked, in radians.
+    reach: f64,
+    gather: Gather,
+    pub(crate) regridded: Regridded,
+}
+
+/// An angle of a setting in radians.
+fn positive(what: &'static str, degrees: f64) -> Result<f64, Error> {
+    match degrees {
+        _ if degrees.is_finite() && degrees > 0.0 => Ok(degrees.to_radians()),
+        value => Err(Error::Setting { what, value, expected: "an angle in degrees greater than 0" }),
+    }
+}
 
 /// Values at points.
 pub(crate) struct Samples {
@@ -32,7 +56,7 @@ impl Samples {
         let nside = spacing.map(closest_nside);
         let covered = match nside {
             Some(_) => {
-                Some(self.gather(nside, &Regrid { gather: Gather::Nearest, ..Regrid::default() })?.share_valid())
+                Some(self.gather(nside, &Regrid { gather: Some(Gather::Nearest), ..Regrid::default() })?.share_valid())
             }
             None => None,
         };
@@ -40,36 +64,39 @@ impl Samples {
         Ok(GridDescription::Points { points, coordinates, spacing: spacing.map(f64::to_degrees), nside, covered })
     }
 
+    /// How the samples, of which there is at least one, become a map.
+    ///
+    /// The Nside is that of the pixels closest to the typical distance between points unless given.
+    ///
+    /// # Errors
+    /// Where the settings are impossible, or missing where all samples are at one place.
+    pub(crate) fn plan(&self, nside: Option<usize>, regrid: &Regrid) -> Result<Plan, Error> {
+        let reach = regrid.reach.map(|reach| positive("the reach", reach)).transpose()?;
+        let places = places(self.directions.iter().copied());
+        let spacing = spacing(&places);
+        let nside = nside.or_else(|| spacing.map(closest_nside)).ok_or(Error::OnePlace)?;
+        let reach = reach.or_else(|| spacing.map(|spacing| REACH * spacing)).ok_or(Error::OnePlace)?;
+        let grid = Healpix::new(nside)?;
+        let (gather, regridded) = regridded::gather(spacing, grid, regrid.gather);
+        Ok(Plan { places, grid, reach, gather, regridded })
+    }
+
     /// Makes a map of the samples, of which there is at least one.
     ///
-    /// The Nside is that of the pixels closest to the typical distance between points unless given. Coincident samples count each, except that the nearest one
-    /// is the first of them. A pixel whose centre no Gaussian reaches has the value of the nearest sample, to which the
-    /// weighted mean tends far from all samples.
+    /// Coincident samples count each, except that the nearest one is the first of them. A pixel whose centre no Gaussian
+    /// reaches has the value of the nearest sample, to which the weighted mean tends far from all samples.
     ///
     /// # Errors
     /// Where the settings are impossible, or missing where all samples are at one place.
     pub(crate) fn gather(&self, nside: Option<usize>, regrid: &Regrid) -> Result<Map, Error> {
-        let positive = |what, value: f64| match value {
-            _ if value.is_finite() && value > 0.0 => Ok(value.to_radians()),
-            _ => Err(Error::Setting { what, value, expected: "an angle in degrees greater than 0" }),
-        };
-        let reach = regrid.reach.map(|reach| positive("the reach", reach)).transpose()?;
-        let places = places(self.directions.iter().copied());
-        let (nside, reach) = match (nside, reach) {
-            (Some(nside), Some(reach)) => (nside, reach),
-            _ => {
-                let spacing = spacing(&places).ok_or(Error::OnePlace)?;
-                (nside.unwrap_or_else(|| closest_nside(spacing)), reach.unwrap_or(REACH * spacing))
-            }
-        };
-        let grid = Healpix::new(nside)?;
+        let Plan { places, grid, reach, gather, regridded } = self.plan(nside, regrid)?;
         let reach = (reach < PI).then(|| chord(reach).powi(2));
         // The value of the nearest sample, where it is within reach.
         let near = |direction| {
             let (sample, squared) = nearest(&places, direction)?;
             reach.is_none_or(|reach| squared <= reach).then(|| self.values[sample])
         };
-        match regrid.gather {
+        let mut map = match gather {
             Gather::Nearest => chart(grid, |_, direction| near(direction).unwrap_or(f64::NAN)),
             Gather::Mean => {
                 let means = self.means(grid);
@@ -94,7 +121,9 @@ impl Samples {
                     if weights > 0.0 { near + sum / weights } else { near }
                 })
             }
-        }
+        }?;
+        map.regridded = Some(regridded);
+        Ok(map)
     }
 
     /// The mean of the samples in each pixel that has any.

@@ -80,7 +80,7 @@ impl Waves {
     /// What a user should know before measuring this field on a grid.
     pub fn warning(&self, grid: Healpix) -> Option<Warning> {
         let correlation = self.correlation.to_degrees();
-        let pixel = (2.0 * TAU / grid.pixels() as f64).sqrt().to_degrees();
+        let pixel = grid.pixel_side().to_degrees();
         (correlation < PIXELS_PER_CORRELATION * pixel).then_some(Warning::Unresolved { correlation, pixel })
     }
 

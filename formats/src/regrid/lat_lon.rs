@@ -3,9 +3,9 @@
 //! A coordinate is sorted here once, eastward or northward, and each of its points and cells keeps the number that it
 //! was given with. How a grid becomes a map is left to [`super::Weights`].
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
-use crate::{Error, NSIDE_MAX};
+use crate::{Error, Healpix, NSIDE_MAX};
 
 /// Latitudes may lie this far beyond a pole, in degrees: single precision has 4e-6 there.
 const LATITUDE_TOLERANCE: f64 = 1e-4;
@@ -143,6 +143,11 @@ impl LatLon {
         (self.latitudes.spacing() * self.longitudes.spacing()).sqrt()
     }
 
+    /// Whether there are points on all sides to interpolate between, and not one row or column alone.
+    pub(crate) fn has_squares(&self) -> bool {
+        self.latitudes.points.len() > 1 && self.longitudes.points.len() > 1
+    }
+
     /// Whether the cells cover the sphere, from pole to pole and once around.
     pub fn is_global(&self) -> bool {
         let ends = (self.latitudes.cells.first(), self.latitudes.cells.last());
@@ -151,7 +156,7 @@ impl LatLon {
 
     /// The Nside, a power of two, with pixels closest in size to the grid's spacing.
     pub fn nside_closest(&self) -> usize {
-        let nside = (PI / 3.0).sqrt() / self.spacing_degrees().to_radians();
+        let nside = Healpix::BASE.pixel_side() / self.spacing_degrees().to_radians();
         1 << (nside.log2().round() as u32).min(NSIDE_MAX.ilog2())
     }
 }

@@ -43,7 +43,7 @@ fn eastward(column: usize) -> f64 {
 
 #[test]
 fn the_plain_one_is_right() {
-    let nearest = Regrid { method: Method::Nearest, ..Regrid::default() };
+    let nearest = Regrid { method: Some(Method::Nearest), ..Regrid::default() };
     let selection = Selection { nside: Some(16), regrid: nearest, ..Selection::default() };
     let map = longan_formats::read(&plain().scratch().path, &selection).unwrap();
     let mut compared = 0;

@@ -57,7 +57,7 @@ fn every_way_agrees_with_plain_sums() {
     let text = "lon,lat,v\n".to_owned() + &rows.collect::<String>();
     for gather in GATHERS {
         for reach in [8.0, 180.0] {
-            let regrid = Regrid { gather, reach: Some(reach), ..Regrid::default() };
+            let regrid = Regrid { gather: Some(gather), reach: Some(reach), ..Regrid::default() };
             let map = read_with(text.as_bytes(), &nside(8, regrid)).unwrap();
             let plain = plainly(&points, &values, map.grid(), gather);
             assert!(reach > 90.0 || map.values().iter().any(|v| v.is_nan()));
@@ -134,7 +134,7 @@ fn the_uncovered_half_is_masked() {
                 assert!(v.is_nan());
             }
         }
-        let reach = Regrid { gather, reach: Some(20.0), ..Regrid::default() };
+        let reach = Regrid { gather: Some(gather), reach: Some(20.0), ..Regrid::default() };
         let map = read_with(text.as_bytes(), &nside(32, reach)).unwrap();
         let covered = map.values().iter().filter(|v| v.is_finite()).count() as f64 / map.grid().pixels() as f64;
         assert!((covered - (1.0 + 20f64.to_radians().sin()) / 2.0).abs() < 0.01, "{covered}");
@@ -147,7 +147,7 @@ fn coincident_points() {
     let text = "lon,lat,v\n0,45,1\n360,45,3\n90,-45,10\n";
     let at = |gather| {
         let map =
-            read_with(text.as_bytes(), &nside(1, Regrid { gather, reach: Some(180.0), ..Regrid::default() })).unwrap();
+            read_with(text.as_bytes(), &nside(1, Regrid { gather: Some(gather), reach: Some(180.0), ..Regrid::default() })).unwrap();
         map.values()[map.grid().pixel_at(45f64.to_radians(), 0.0)]
     };
     assert_eq!(at(Gather::Mean), 2.0);

@@ -39,7 +39,7 @@ fn nside(nside: usize, regrid: Regrid) -> Selection {
 }
 
 fn gather(gather: Gather) -> Regrid {
-    Regrid { gather, ..Regrid::default() }
+    Regrid { gather: Some(gather), ..Regrid::default() }
 }
 
 /// The problem with a file of these bytes, and what the user is told after the file's name.
