@@ -369,6 +369,11 @@ pub trait Adapter: Sync {
     /// format. The file's name plays no part.
     fn recognises(&self, head: &[u8]) -> bool;
 
+    /// Whether such files may hold fields that come to HEALPix in one of several ways.
+    fn has_ways(&self) -> bool {
+        true
+    }
+
     /// What the file holds.
     ///
     /// # Errors
@@ -410,6 +415,15 @@ pub fn read(path: &Path, selection: &Selection) -> Result<Map, Error> {
 /// [`Error::File`], which names the file, around the reason.
 pub fn describe(path: &Path) -> Result<Description, Error> {
     adapter(path).and_then(|adapter| adapter.describe(path)).map_err(|e| e.of(path))
+}
+
+/// Whether a file, from its first bytes, may hold fields that come to HEALPix in one of several ways, as
+/// [`Maps::regridded`] tells.
+///
+/// # Errors
+/// [`Error::File`], which names the file, around the reason.
+pub fn has_ways(path: &Path) -> Result<bool, Error> {
+    adapter(path).map(|adapter| adapter.has_ways()).map_err(|e| e.of(path))
 }
 
 /// Whether a path is a folder that is read as if it were a file: a Zarr store.

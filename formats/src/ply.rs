@@ -59,6 +59,10 @@ impl Adapter for SurfacePly {
         first.trim_ascii_end() == b"ply" && first.len() < head.len()
     }
 
+    fn has_ways(&self) -> bool {
+        false
+    }
+
     fn describe(&self, path: &Path) -> Result<Description, Error> {
         let mut input = BufReader::new(File::open(path).map_err(Error::io("open it"))?);
         let header = Header::parse(&mut input)?;

@@ -30,6 +30,9 @@ use report::{OfMeasure, Region, Report};
 use said::{Column, Said};
 use scatter::{At, Scatter};
 
+/// Inputs whose spacings differ by less than this factor, as where a few points are missing, count as equally fine.
+const SAME_RATIO: f64 = 1.1;
+
 /// A Minkowski map of data among those of simulations: how far it deviates, where, and how often that happens.
 ///
 /// For each measure, such as EVQ, and each pixel: EVQ_MEAN and EVQ_STD, mean and standard deviation (n - 1) of the
@@ -156,6 +159,28 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             data.input_nside,
             shown(&other.path),
             other.input_nside
+        ));
+    }
+
+    if let Some(other) = simulations.iter().find(|other| other.way.is_empty() != data.way.is_empty()) {
+        let said = |file: &Said| if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) };
+        arguments.running.warn(format_args!(
+            "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
+            shown(&data.path),
+            said(data),
+            shown(&other.path),
+            said(other)
+        ));
+    }
+    let apart = |other: &&Said| match (data.ratio, other.ratio) {
+        (Some(one), Some(other)) => (one / other).ln().abs() > SAME_RATIO.ln(),
+        _ => false,
+    };
+    if let Some(other) = simulations.iter().find(apart) {
+        arguments.running.warn(format_args!(
+            "the input of {} has another spacing than that of {}; shapes depend on the resolution",
+            shown(&data.path),
+            shown(&other.path)
         ));
     }
 

@@ -20,12 +20,13 @@ use longan::totals::Totals;
 use longan::{Analysis, AnalysisError, Body, Map, Region, ThresholdUnit};
 
 use super::drawn::{Form, save};
-use super::input::{Input, Mask, Series};
+use super::input::Input;
 use super::mapping::{find, no_measure};
 use super::misused;
 use super::options::{BodyOptions, Running, WeightOption, between, check_memory, nside, shown};
 use super::plugin::Plugins;
 use super::progress::Progress;
+use super::regridding;
 use ensemble::Ensemble;
 
 /// Measures of shape against threshold: a picture, and the numbers as CSV beside it.
@@ -206,13 +207,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
 
     let progress = Progress::new(shown(&arguments.output), arguments.running.quiet);
+    let told = regridding::Said::default();
     let mut done = 0;
     let mut all_of = |files: &[PathBuf], keep: &mut dyn FnMut(Curves)| -> anyhow::Result<()> {
         for path in files {
             let mut series = arguments.input.open(path)?;
             for step in 0..series.steps() {
-                let told = |share: f64| progress.set((done as f64 + share) / all as f64);
-                if let Some(curves) = arguments.one(&plan, path, &mut series, step, mask.as_ref(), told)? {
+                let share = |share: f64| progress.set((done as f64 + share) / all as f64);
+                let map = series.read(step, mask.as_ref())?;
+                if step == 0 {
+                    progress.aside(|| told.say(&arguments.running, path, &map));
+                }
+                if let Some(curves) = arguments.one(&plan, path, &map, series.steps(), share)? {
                     keep(curves);
                 }
                 done += 1;
@@ -325,15 +331,13 @@ impl Arguments {
         &self,
         plan: &Plan,
         path: &Path,
-        series: &mut Series,
-        step: usize,
-        mask: Option<&Mask>,
+        map: &Map,
+        steps: usize,
         told: impl FnMut(f64),
     ) -> anyhow::Result<Option<Curves>> {
-        let map = series.read(step, mask)?;
-        let curves = match plan.curves(path, &map, told) {
-            Err(error) if series.steps() > 1 && nothing_to_measure(&error) => {
-                let when = map.time.map(|time| time.label).unwrap_or_default();
+        let curves = match plan.curves(path, map, told) {
+            Err(error) if steps > 1 && nothing_to_measure(&error) => {
+                let when = map.time.as_ref().map(|time| time.label.as_str()).unwrap_or_default();
                 self.running.warn(format_args!("{}: at {when}: {error}", shown(path)));
                 None
             }

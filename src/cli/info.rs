@@ -7,7 +7,7 @@ use anyhow::bail;
 use clap::Args;
 use longan::formats::{
     self, At, AxisDescription, Description, DimensionDescription, Error, Field, FieldDescription, GridDescription,
-    Indexing, Selection, TableDescription, TablePlace,
+    Healpix, Indexing, Selection, TableDescription, TablePlace,
 };
 use longan::statistics::{Statistics, statistics};
 use serde::Serialize;
@@ -304,5 +304,5 @@ fn write_grid(out: &mut String, grid: &GridDescription) -> std::fmt::Result {
 
 /// Side of a square of a pixel's area, in degrees.
 fn spacing(nside: usize) -> f64 {
-    (std::f64::consts::PI / 3.0).sqrt().to_degrees() / nside as f64
+    Healpix::new(nside).map_or(f64::NAN, |grid| grid.pixel_side().to_degrees())
 }

@@ -52,18 +52,21 @@ pub(crate) struct Input {
 #[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Other grids, points and surfaces")]
 struct RegridOptions {
-    /// Latitude-longitude grids: the mean over each pixel (exact overlaps), between the four grid points about its
-    /// centre, or the grid point nearest to it.
-    #[arg(long, value_name = "METHOD", default_value = "conservative")]
-    method: MethodOption,
+    /// Latitude-longitude grids: the mean over each pixel (exact overlaps, which keep integrals), between the four grid
+    /// points about its centre (nothing beyond the outermost ones of a region), or the grid point nearest to it
+    /// [default: conservative; bilinear where the grid's spacing is more than 1.41 times the side of a pixel, as
+    /// conservative draws the outlines of cells there].
+    #[arg(long, value_name = "METHOD")]
+    method: Option<MethodOption>,
     /// Latitude-longitude grids: pixels with a smaller share of valid values than this, from 0 to 1, are masked.
     #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
     #[arg(allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 1.0))]
     min_valid: f64,
     /// Points: the mean of those in a pixel, all weighted by a Gaussian of this full width at half maximum in degrees,
-    /// such as gaussian:5, or the nearest.
-    #[arg(long, value_name = "mean|gaussian:FWHM|nearest", default_value = "mean", value_parser = gather)]
-    gather: Gather,
+    /// such as gaussian:5, or the nearest [default: mean; where the typical distance between points is more than 1.41
+    /// times the side of a pixel, a Gaussian of twice that distance, as most pixels hold no point there].
+    #[arg(long, value_name = "mean|gaussian:FWHM|nearest", value_parser = gather)]
+    gather: Option<Gather>,
     /// Points: pixels farther than this from any are masked, in degrees [default: twice the typical distance between
     /// points].
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
@@ -88,11 +91,11 @@ impl Input {
     /// What is read of each file.
     fn selection(&self) -> Selection {
         let RegridOptions { method, min_valid, gather, reach, centre, allow_folds } = self.regrid;
-        let method = match method {
+        let method = method.map(|method| match method {
             MethodOption::Conservative => Method::Conservative,
             MethodOption::Bilinear => Method::Bilinear,
             MethodOption::Nearest => Method::Nearest,
-        };
+        });
         Selection {
             field: self.field.clone(),
             hdu: self.hdu,
@@ -104,13 +107,31 @@ impl Input {
 
     /// The mask, if there is one, once it is clear that it can be read.
     pub(crate) fn mask(&self) -> Result<Option<Mask>, Error> {
+        // The cells of a mask are what they are, however fine the pixels.
+        let regrid =
+            Regrid { method: Some(Method::Conservative), gather: Some(Gather::Mean), ..Regrid::default() };
         let selection =
-            Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), ..Selection::default() };
+            Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), regrid, ..Selection::default() };
         let mask = |path: &PathBuf| {
             formats::open(path, &selection)?;
             Ok(Mask { path: path.clone(), selection, threshold: self.mask_threshold, map: Mutex::default() })
         };
         self.mask.as_ref().map(mask).transpose()
+    }
+
+    /// Forgets which ways to HEALPix were asked for.
+    pub(crate) fn leave_out_ways(&mut self) {
+        self.regrid.method = None;
+        self.regrid.gather = None;
+    }
+
+    /// The name of the way in which a file's maps come to HEALPix, where there are several ways.
+    pub(crate) fn way(&self, path: &Path) -> Result<Option<String>, Error> {
+        if !formats::has_ways(path)? {
+            return Ok(None);
+        }
+        let regridded = formats::open(path, &self.selection())?.regridded()?;
+        Ok(regridded.map(|regridded| regridded.way.to_string()))
     }
 
     /// The maps of a file.

@@ -10,13 +10,14 @@ use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Parser};
-use longan::formats::{self, CardValue, Error};
+use longan::formats::{self, CardValue, Error, TableDescription};
 
 use super::jobs::Jobs;
 use super::mapping::{Made, Mapper, Mapping};
 use super::options::{Running, is_same_file, shown};
 use super::output::command;
 use super::progress::{Progress, rate};
+use super::regridding;
 use super::sink::Kind;
 
 /// Minkowski map of a field on the sphere: measures of shape in windows about the pixels of a coarser grid.
@@ -179,7 +180,8 @@ impl Arguments {
 
     /// Refuses an output that was not made of this input as this run would make it.
     fn check_finished(&self, input: &Path, output: &Path) -> anyhow::Result<()> {
-        let made_by = made_by(output).with_context(|| {
+        let table = formats::describe(output).ok().and_then(|description| description.tables.into_iter().next());
+        let made_by = table.as_ref().and_then(made_by).with_context(|| {
             format!(
                 "{}: this does not say that `longan map` made it, so --resume cannot go by it; remove it or choose \
                  another folder",
@@ -200,6 +202,21 @@ impl Arguments {
             "{}: this was made by `{made_by}`, and not as by `{wanted}`; choose another folder, or replace it with \
              --overwrite instead of --resume",
             shown(output)
+        );
+        // Of an input that is gone nothing else can be made.
+        let Ok(wanted) = self.mapping.input().way(input) else { return Ok(()) };
+        let way = match table.as_ref().and_then(|table| table.card(regridding::WAY)) {
+            Some(CardValue::Text(way)) => Some(way.trim_end().to_owned()),
+            _ => None,
+        };
+        let named = |way: Option<String>| way.map_or("none".to_owned(), |way| format!("'{way}'"));
+        ensure!(
+            way == wanted,
+            "{}: the way in which its input came to HEALPix is {}, and would now be {}; choose another folder, or replace \
+             it with --overwrite instead of --resume",
+            shown(output),
+            named(way),
+            named(wanted)
         );
         Ok(())
     }
@@ -222,15 +239,14 @@ impl Arguments {
         };
         drop(part);
         progress.aside(|| {
-            let Some(Made { summary, mut ways, warning }) = made else { return meanwhile() };
-            if let Some(warning) = warning {
-                self.running.warn(warning);
-            }
+            let Some(Made { summary, mut ways, note, warnings }) = made else { return meanwhile() };
+            warnings.into_iter().for_each(|warning| self.running.warn(warning));
             if !self.verbose {
                 ways.clear();
             }
             // One text, so that lines about other maps do not come in between.
-            ways.push(format!("{}: {summary}", shown(output)));
+            let note = note.map(|note| format!("; {note}")).unwrap_or_default();
+            ways.push(format!("{}: {summary}{note}", shown(output)));
             self.running.say(ways.join("\n"))
         })
     }
@@ -245,9 +261,7 @@ fn is_exists(error: &Error) -> bool {
 }
 
 /// The command that made an output of `longan map`, as its header says.
-fn made_by(output: &Path) -> Option<String> {
-    let description = formats::describe(output).ok()?;
-    let table = description.tables.first()?;
+fn made_by(table: &TableDescription) -> Option<String> {
     let said = table.card("COMMAND").or_else(|| table.card("HISTORY"))?;
     let CardValue::Text(text) = said else { return None };
     // Other programs may have added lines to a history.

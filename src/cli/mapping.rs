@@ -21,6 +21,7 @@ use super::misused;
 use super::options::{BodyOptions, WeightOption, between, check_memory, decimals, is_same_file, nside, shown};
 use super::output::Provenance;
 use super::plugin::Plugins;
+use super::regridding;
 use super::sink::{self, Kind, LayoutOptions};
 
 /// What of a file is measured, how, and in which layout the result is written.
@@ -80,10 +81,12 @@ impl Mapping {
         Ok(Mapper { mapping: self, measures, mask: self.input.mask()?, analysis: self.analysis(), memory })
     }
 
-    /// Whether these options ask for the same as others, in whatever way they are given.
+    /// Whether these options ask for the same as others, in whatever way they are given; but for how fields come to
+    /// HEALPix, which may be left to the field.
     pub(crate) fn is_same(&self, other: &Mapping) -> bool {
         let [one, other] = [self, other].map(|mapping| {
             let mut mapping = mapping.clone();
+            mapping.input.leave_out_ways();
             mapping.measure = mapping.measure.iter().flat_map(|list| split(list)).map(str::to_owned).collect();
             if mapping.measure.is_empty() {
                 mapping.measure.push(DEFAULT.to_owned());
@@ -183,8 +186,10 @@ pub(crate) struct Made {
     pub(crate) summary: String,
     /// For each window how it was summed, and why.
     pub(crate) ways: Vec<String>,
+    /// How the map came to HEALPix, where that is another way than the usual one.
+    pub(crate) note: Option<String>,
     /// What a user should know.
-    pub(crate) warning: Option<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Mapper<'_> {
@@ -209,6 +214,8 @@ impl Mapper<'_> {
         let layout = mapping.layout.layout(&map, grid, kind, steps).with_context(about)?;
         let tables = self.tables();
         check_memory(grid, tables * measures.len()).with_context(about)?;
+        let note = regridding::note(&map);
+        let mut warnings: Vec<String> = regridding::warning(path, &map).into_iter().collect();
         let mut first = Some(map);
         let mut summary = Summary::default();
         let mut ways = Vec::new();
@@ -240,15 +247,15 @@ impl Mapper<'_> {
             let input = Some(&mapping.input);
             Ok(Provenance { path, map: &map, input, analysis, command: command.to_owned() }.step(maps, measures))
         })?;
-        let warning = empty.first().map(|one| {
+        warnings.extend(empty.first().map(|one| {
             let (about, n) = (about(), empty.len());
             let others = if n > 1 { format!(" and {} other steps", n - 1) } else { String::new() };
             format!("{about}: the map at {one}{others} is masked or constant, so the result is masked there")
-        });
+        }));
         let of = if steps > 1 { format!("{steps} steps of ") } else { String::new() };
         let all = format!("{of}{} of Nside {}", measures[0].column(), grid.nside());
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Made { summary: format!("{all} {summary} ({seconds:.2} s)"), ways, warning })
+        Ok(Made { summary: format!("{all} {summary} ({seconds:.2} s)"), ways, note, warnings })
     }
 
     /// About how many bytes it takes to map a file, where that shows before it is read.

@@ -20,6 +20,7 @@ mod plot;
 mod plugin;
 mod progress;
 mod regrid;
+mod regridding;
 mod simulate;
 mod sink;
 mod totals;

@@ -113,11 +113,20 @@ impl Running {
         if self.quiet { Ok(()) } else { print(&format!("{line}\n")) }
     }
 
-    /// Prints a line to standard error, unless nothing is to be printed.
+    /// Prints a warning, of one line, to standard error, unless nothing is to be printed.
     pub(crate) fn warn(&self, line: impl Display) {
+        self.tell("warning", line);
+    }
+
+    /// Prints a line to standard error of what is no loss but good to know, unless nothing is to be printed.
+    pub(crate) fn note(&self, line: impl Display) {
+        self.tell("note", line);
+    }
+
+    fn tell(&self, kind: &str, line: impl Display) {
         if !self.quiet {
             // There is no other place to complain to.
-            let _ = writeln!(io::stderr(), "longan: {line}");
+            let _ = writeln!(io::stderr(), "{kind}: {line}");
         }
     }
 }

@@ -8,6 +8,7 @@ use longan::measures::{Measure, Origin};
 use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
 
 use super::input::Input;
+use super::regridding;
 use super::sink::{MapColumn, Step, Table};
 
 /// What is said in headers about a map and its analysis.
@@ -208,13 +209,15 @@ impl Provenance<'_> {
 
 /// What is said of the map that a file is made of.
 pub(crate) fn input_cards(path: &Path, map: &Map) -> Vec<Card> {
-    vec![
+    let mut cards = vec![
         creator(),
         text("INFILE", path.to_string_lossy(), "file analysed"),
         text("INFIELD", map.name.clone(), "field analysed"),
         text("INUNIT", map.unit.clone().unwrap_or_default(), "its unit"),
         integer("INNSIDE", map.grid().nside(), "its Nside"),
-    ]
+    ];
+    cards.extend(regridding::cards(map));
+    cards
 }
 
 /// What is said of its mask, if there is one.

@@ -22,6 +22,7 @@ use super::drawn::{Form, save};
 use super::input::{Input, Mask, field, place};
 use super::misused;
 use super::options::{Running, finite, shown};
+use super::regridding;
 
 /// A picture of a map: PNG, or SVG whose lines and letters stay sharp at any size.
 ///
@@ -153,6 +154,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     formats::check_writable(output, arguments.overwrite)?;
     let mask = arguments.input.mask()?;
     let map = arguments.read(&arguments.input, path, mask.as_ref())?;
+    if let Some(warning) = regridding::warning(path, &map) {
+        running.warn(warning);
+    }
     if map.values().iter().all(|v| v.is_nan()) {
         running.warn(format_args!("{}: every pixel is masked, so the picture is grey", shown(path)));
     }
@@ -187,7 +191,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let drawing = draw(map.values(), &options).with_context(|| shown(path))?;
     save(output, arguments.overwrite, &form.bytes(&drawing)?)?;
     let (nside, seconds) = (map.grid().nside(), start.elapsed().as_secs_f64());
-    running.say(format_args!("{}: {} of Nside {nside} ({seconds:.2} s)", shown(output), map.name))
+    let note = regridding::note(&map).map(|note| format!("; {note}")).unwrap_or_default();
+    running.say(format_args!("{}: {} of Nside {nside} ({seconds:.2} s){note}", shown(output), map.name))
 }
 
 impl Arguments {

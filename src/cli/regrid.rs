@@ -12,6 +12,7 @@ use super::mapping::Summary;
 use super::options::{Running, shown};
 use super::output::{command, input_cards, mask_cards, text};
 use super::progress::Progress;
+use super::regridding;
 use super::sink::{self, Kind, LayoutOptions, MapColumn, Step, Table};
 
 /// The map of a file as HEALPix, whatever it was, with nothing measured.
@@ -57,6 +58,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut first = Some(series.read(0, mask.as_ref())?);
     let map = first.iter().next().context("a map")?;
     let (name, grid) = (map.name.clone(), map.grid());
+    let note = regridding::note(map).map(|note| format!("; {note}")).unwrap_or_default();
+    let warning = regridding::warning(path, map);
     let layout = layout.layout(map, grid, kind, steps).with_context(|| shown(path))?;
     let progress = Progress::new(shown(path), running.quiet);
     let mut summary = Summary::default();
@@ -70,10 +73,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Ok(of(path, map, input))
     })?;
     drop(progress);
+    if let Some(warning) = warning {
+        running.warn(warning);
+    }
     let of = if steps > 1 { format!("{steps} steps of ") } else { String::new() };
     let seconds = start.elapsed().as_secs_f64();
     let nside = grid.nside();
-    running.say(format_args!("{}: {of}{name} of Nside {nside} {summary} ({seconds:.2} s)", shown(output)))
+    running.say(format_args!("{}: {of}{name} of Nside {nside} {summary} ({seconds:.2} s){note}", shown(output)))
 }
 
 /// What is written of a map.

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::input::Input;
 use super::options::{BodyOptions, Running, decimals, print, shown};
 use super::progress::Progress;
+use super::regridding;
 
 /// Area, length, curvature and Euler characteristic of the body, at each threshold, over the whole sphere.
 ///
@@ -69,6 +70,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (mut all, mut unit) = (Vec::new(), None);
     for step in 0..steps {
         let map = series.read(step, mask.as_ref())?;
+        if step == 0 {
+            regridding::Said::default().say(&arguments.running, path, &map);
+        }
         let time = map.time.as_ref().map(|time| time.label.clone());
         let rows = match arguments.body.analysis().totals(&map) {
             // Of a step that has nothing to measure there are no rows.

@@ -220,12 +220,11 @@ impl Rods {
     /// Rods about the pixels of the finest grid, up to the map's own, on which they have room, each a line in pixels.
     fn seen(&self, place: &Place<'_>) -> Vec<Vec<(f64, f64)>> {
         let Some(grid) = Healpix::with_pixels(self.directions.len()) else { return Vec::new() };
-        // Nside for which pixels, √(π/3)/Nside radians wide, are that far apart in the picture's middle.
-        let pixel = std::f64::consts::FRAC_PI_3.sqrt();
-        let nside = pixel * place.scale() / (ROD_SPACING * place.width());
+        // Nside for which pixels are that far apart in the picture's middle.
+        let nside = grid.pixel_side() * grid.nside() as f64 * place.scale() / (ROD_SPACING * place.width());
         let nside = (nside.max(1.0) as usize).min(grid.nside());
         let Ok(of_rods) = Healpix::new(nside) else { return Vec::new() };
-        let half = 0.5 * ROD_LENGTH * pixel / nside as f64;
+        let half = 0.5 * ROD_LENGTH * of_rods.pixel_side();
         // Of a fine grid only what is seen is gone through.
         let mut rods = Vec::new();
         for p in 0..of_rods.pixels() {

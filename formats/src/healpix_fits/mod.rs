@@ -38,6 +38,10 @@ impl Adapter for HealpixFits {
         inner.as_deref().unwrap_or(head).starts_with(b"SIMPLE  =")
     }
 
+    fn has_ways(&self) -> bool {
+        false
+    }
+
     fn describe(&self, path: &Path) -> Result<Description, Error> {
         let mut fits = open(path)?;
         let tables = scan::healpix_tables(&mut fits)?

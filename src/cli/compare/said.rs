@@ -8,9 +8,25 @@ use anyhow::{Context, bail, ensure};
 use longan::formats::{self, CardValue, Field, GridDescription, Map, Selection, TableDescription, TablePlace};
 
 use super::super::options::shown;
+use super::super::regridding;
 
 /// Thresholds in standard deviations, counted back from the map's unit, are the same within this.
 const SAME_THRESHOLD: f64 = 1e-6;
+
+/// Entries that the comparison's header repeats.
+const REPEATED: [&str; 11] = [
+    "INFILE",
+    "INFIELD",
+    "INUNIT",
+    "INNSIDE",
+    regridding::WAY,
+    regridding::RATIO,
+    "WINDOW",
+    "BODY",
+    "WEIGHT",
+    "THRUNIT",
+    "NTHRESH",
+];
 
 /// A file of Minkowski maps.
 pub(super) struct Said {
@@ -32,6 +48,10 @@ pub(super) struct Said {
     pub(super) others: usize,
     /// Nside of the map that was measured.
     pub(super) input_nside: String,
+    /// The way in which that map came to HEALPix; empty where the file does not say it.
+    pub(super) way: String,
+    /// The spacing of what it was made of, in sides of a pixel, where the file says it.
+    pub(super) ratio: Option<f64>,
     /// Entries that the comparison's header repeats.
     pub(super) repeated: Vec<(&'static str, CardValue)>,
 }
@@ -147,10 +167,9 @@ impl Said {
             facts,
             thresholds: (thresholds, if sigma { "sigma".to_owned() } else { word("INUNIT") }),
             input_nside: word("INNSIDE"),
-            repeated: ["INFILE", "INFIELD", "INUNIT", "INNSIDE", "WINDOW", "BODY", "WEIGHT", "THRUNIT", "NTHRESH"]
-                .into_iter()
-                .filter_map(repeat)
-                .collect(),
+            way: word(regridding::WAY),
+            ratio: real(regridding::RATIO),
+            repeated: REPEATED.into_iter().filter_map(repeat).collect(),
         }
     }
 
@@ -172,6 +191,9 @@ impl Said {
         for (what, mine) in &self.facts {
             let others = other.facts.iter().find(|(same, _)| same == what).map_or("", |(_, value)| value);
             ensure!(mine == others, differ(what, mine, others));
+        }
+        if let (false, false) = (self.way.is_empty(), other.way.is_empty()) {
+            ensure!(self.way == other.way, differ("the way to HEALPix", &self.way, &other.way));
         }
         let near = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME_THRESHOLD * (1.0 + a.abs());
         let (mine, others) = (&self.thresholds.0, &other.thresholds.0);

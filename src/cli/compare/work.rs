@@ -17,6 +17,7 @@ use super::super::misused;
 use super::super::options::{Running, is_same_file, shown};
 use super::super::output::command;
 use super::super::progress::Progress;
+use super::super::regridding;
 use super::super::sink::Kind;
 use super::said::{Said, made_of};
 
@@ -54,13 +55,15 @@ pub(super) fn minkowski_maps(
     let tasks = tasks(inputs, &outputs, mapping.mask())?;
     let all: Vec<PathBuf> = inputs.iter().map(|input| input.to_path_buf()).collect();
     let progress = Progress::of_parts(tasks.len(), running.quiet || tasks.is_empty());
+    let told = regridding::Said::default();
     let made = jobs.run(&tasks, |(input, output)| {
         let part = progress.part();
         let made = mapper.map(input, output, true, &command(&all, input), |share| part.set(share))?;
         drop(part);
-        if let Some(warning) = made.warning {
-            progress.aside(|| running.warn(warning));
-        }
+        progress.aside(|| {
+            told.say_note(running, input, made.note);
+            made.warnings.into_iter().for_each(|warning| running.warn(warning));
+        });
         anyhow::Ok(())
     });
     drop(progress);
