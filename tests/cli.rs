@@ -14,6 +14,8 @@ mod compile;
 mod compare;
 /// Every family of files, from end to end.
 mod families;
+/// Pixels finer than the grid, or than points lie.
+mod finer;
 /// Measures as formulas.
 mod formulas;
 /// `longan graph`.
