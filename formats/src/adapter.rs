@@ -107,14 +107,7 @@ pub struct Regrid {
 
 impl Default for Regrid {
     fn default() -> Self {
-        Regrid {
-            method: None,
-            min_valid: 0.5,
-            gather: None,
-            reach: None,
-            centre: None,
-            allow_folds: false,
-        }
+        Regrid { method: None, min_valid: 0.5, gather: None, reach: None, centre: None, allow_folds: false }
     }
 }
 

@@ -12,7 +12,8 @@ use crate::columns::{self, Column, shown};
 use crate::directions::{self, FARTHEST, at, from_centre};
 use crate::points::Samples;
 use crate::{
-    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Regridded, Room, Selection, Sphere, Time, UNSEEN, is_bad,
+    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Regridded, Room, Selection, Sphere, Time, UNSEEN,
+    is_bad,
 };
 
 /// What may part cells.

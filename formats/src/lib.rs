@@ -34,8 +34,8 @@ mod zarr_zstd;
 
 pub use adapter::{
     Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
-    Indexing, Maps, Method, Place, Regrid, Room, Selection, TableDescription, TablePlace, describe, has_ways,
-    is_store, open, read,
+    Indexing, Maps, Method, Place, Regrid, Room, Selection, TableDescription, TablePlace, describe, has_ways, is_store,
+    open, read,
 };
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};

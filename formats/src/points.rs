@@ -7,7 +7,9 @@ use std::f64::consts::{LN_2, PI};
 
 use rstar::{PointDistance, RTree};
 
-use crate::directions::{Direction, Numbered, angle, chart, chord, closest_nside, nearest, pixel_at, places, spacing, tree};
+use crate::directions::{
+    Direction, Numbered, angle, chart, chord, closest_nside, nearest, pixel_at, places, spacing, tree,
+};
 use crate::{CoordinateSystem, Error, Gather, GridDescription, Healpix, Map, Regrid, Regridded, regridded};
 
 /// A Gaussian is cut at this many standard deviations, where its weight is 1.5e-8, below the rounding of
@@ -18,8 +20,10 @@ const CUT: f64 = 6.0;
 const REACH: f64 = 2.0;
 
 /// Where pixels are finer than points lie, they are smoothed by a Gaussian of this many times the typical distance, unless
-/// another way is asked for. Among points at random, contours of a field that varies little from one to the next become
-/// 1.6 % too long; 3 % at 1.5 times the distance.
+/// another way is asked for. Among points at random, the contours of a Gaussian field whose correlation angle is four and
+/// eight distances come out 2 % and 0.3 % too short, with the mean and the nearest point 29 % too long. At 1.5 times the
+/// distance they are 1 % and 2 % too long: how points happen to lie shows. What is smaller is lost, 12 % of the contours
+/// where the correlation angle is but two distances.
 pub(crate) const SMOOTH: f64 = 2.0;
 
 /// How samples become a map.

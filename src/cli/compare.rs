@@ -163,7 +163,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
 
     if let Some(other) = simulations.iter().find(|other| other.way.is_empty() != data.way.is_empty()) {
-        let said = |file: &Said| if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) };
+        let said =
+            |file: &Said| if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) };
         arguments.running.warn(format_args!(
             "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
             shown(&data.path),

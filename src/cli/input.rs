@@ -108,8 +108,7 @@ impl Input {
     /// The mask, if there is one, once it is clear that it can be read.
     pub(crate) fn mask(&self) -> Result<Option<Mask>, Error> {
         // The cells of a mask are what they are, however fine the pixels.
-        let regrid =
-            Regrid { method: Some(Method::Conservative), gather: Some(Gather::Mean), ..Regrid::default() };
+        let regrid = Regrid { method: Some(Method::Conservative), gather: Some(Gather::Mean), ..Regrid::default() };
         let selection =
             Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), regrid, ..Selection::default() };
         let mask = |path: &PathBuf| {

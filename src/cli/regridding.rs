@@ -48,11 +48,9 @@ pub(crate) fn warning(path: &Path, map: &Map) -> Option<String> {
     let [pixel, spacing] = [regridded.pixel(), regridded.spacing?].map(degrees);
     let (times, nside) = (digits(regridded.ratio()?, 2), regridded.suitable_nside()?);
     let (than, so, option) = match regridded.way {
-        Way::Grid(_) => (
-            format!("the grid's cells of {spacing}"),
-            "conservative regridding draws their outlines",
-            "--method",
-        ),
+        Way::Grid(_) => {
+            (format!("the grid's cells of {spacing}"), "conservative regridding draws their outlines", "--method")
+        }
         Way::Points(_) => (
             format!("the distance of {spacing} between points"),
             "most of them take the value of the nearest point, which draws outlines about points",

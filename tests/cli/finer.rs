@@ -9,10 +9,14 @@ use super::gridded::Layout;
 use super::*;
 
 /// Where the Legendre polynomial of degree 8 is zero, on the positive side.
-const ZEROS: [f64; 4] = [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_2];
+const ZEROS: [f64; 4] =
+    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_2];
 
-/// Distance of the grid's latitudes and longitudes, in degrees, and typically of points.
+/// Distance of the grid's latitudes and longitudes, in degrees.
 const SPACING: f64 = 2.5;
+
+/// The root of the area that there is for each point, in degrees: the pixels of Nside 32 are as large as that suits.
+const OF_POINTS: f64 = 2.2;
 
 /// Contours are as long as they should be within this share, of all Nsides from that of pixels as large as cells.
 const LENGTH: f64 = 0.01;
@@ -47,7 +51,7 @@ fn truth() -> f64 {
 fn with_fields() -> Folder {
     let folder = Folder::new();
     Layout::of(SPACING).write(&folder.path("grid.nc"), |_, latitude, longitude| smooth(latitude, longitude));
-    let count = (4.0 * PI / SPACING.to_radians().powi(2)) as usize;
+    let count = (4.0 * PI / OF_POINTS.to_radians().powi(2)) as usize;
     let row = |z: f64, turn: f64| {
         let (latitude, longitude) = (z.asin().to_degrees(), 360.0 * turn);
         format!("{longitude},{latitude},{}\n", smooth(latitude, longitude))
@@ -95,14 +99,21 @@ fn steps_that_are_asked_for_are_warned_of() {
     let (found, err) = excess(&folder, "random.csv --nside 128 --gather mean");
     assert!(found > STEPS, "{found}");
     assert!(err.starts_with("warning: random.csv: pixels of 0.458° are 5.") && err.lines().count() == 1, "{err}");
-    assert!(err.contains("times finer than the distance of 2.") && err.ends_with("--gather, or choose --nside 32\n"));
-    for command in ["map grid.nc -o map.fits --window 15", "regrid grid.nc -o grid.fits", "plot grid.nc -o grid.png",
-                    "graph grid.nc -o graph.png --measure w1"] {
+    for part in ["times finer than the distance of 2.", "leave out --gather, or choose --nside 32\n"] {
+        assert!(err.contains(part), "{err}");
+    }
+    for command in [
+        "map grid.nc -o map.fits --window 15",
+        "regrid grid.nc -o grid.fits",
+        "plot grid.nc -o grid.png",
+        "graph grid.nc -o graph.png --measure w1",
+    ] {
         let ran = folder.run(&format!("{command} --nside 128 --method conservative"));
         assert!(ran.code == Some(0) && ran.err == warning && !ran.out.contains("pixels of"), "{command}: {ran:?}");
     }
     // Where pixels are as large as cells, and where the nearest value is wanted, there is nothing to warn of.
-    for options in ["--nside 32 --method conservative", "--nside 128 --method nearest", "--nside 128 --method bilinear"] {
+    for options in ["--nside 32 --method conservative", "--nside 128 --method nearest", "--nside 128 --method bilinear"]
+    {
         folder.done(&format!("totals grid.nc {options}"));
     }
     for options in ["--nside 32 --gather mean", "--nside 128 --gather nearest", "--nside 128 --gather gaussian:4"] {
@@ -124,7 +135,7 @@ fn the_line_of_output_and_headers_say_what_was_done() {
     let ran = folder.run("graph grid.nc -o graph.png --measure w1 --nside 128");
     assert!(ran.code == Some(0) && ran.err == format!("note: grid.nc: {interpolated}\n"), "{ran:?}");
     let out = folder.done("map points.csv -o points.fits --window 15 --nside 128");
-    assert!(out.contains("; smoothed (gaussian:5"), "{out}");
+    assert!(out.contains("; smoothed (gaussian:4.9)"), "{out}");
     // Headers, of both formats.
     folder.done("map grid.nc -o map.nc --window 15 --nside 128");
     let header = &folder.headers("map.fits")[0];
@@ -132,7 +143,7 @@ fn the_line_of_output_and_headers_say_what_was_done() {
     assert!((header["REGRATIO"].parse::<f64>().unwrap() - 5.458).abs() < 1e-3);
     let described = formats::describe(&folder.path("map.nc")).unwrap();
     assert_eq!(described.tables[0].card("REGRID"), Some(&formats::CardValue::Text("bilinear".to_owned())));
-    assert!(folder.headers("points.fits")[0]["REGRID"].starts_with("gaussian:5"));
+    assert!(folder.headers("points.fits")[0]["REGRID"].starts_with("gaussian:4.9"));
     folder.done("map grid.nc -o coarse.fits --window 15");
     assert_eq!(folder.headers("coarse.fits")[0]["REGRID"], "conservative");
     folder.done("map grid.fits -o healpix.fits --window 15");
@@ -145,11 +156,15 @@ fn a_region_is_told_to_lose_its_rim() {
     let degrees: Vec<f64> = (0..20).map(f64::from).collect();
     let values: Vec<f64> = (0..400).map(f64::from).collect();
     let units = |units: &str| serde_json::json!({"units": units});
-    gridded::zarr(&folder.path("region.zarr"), 2, &[
-        ("t", &[20, 20], &values, units("K"), &["lat", "lon"]),
-        ("lat", &[20], &degrees, units("degrees_north"), &["lat"]),
-        ("lon", &[20], &degrees, units("degrees_east"), &["lon"]),
-    ]);
+    gridded::zarr(
+        &folder.path("region.zarr"),
+        2,
+        &[
+            ("t", &[20, 20], &values, units("K"), &["lat", "lon"]),
+            ("lat", &[20], &degrees, units("degrees_north"), &["lat"]),
+            ("lon", &[20], &degrees, units("degrees_east"), &["lon"]),
+        ],
+    );
     let out = folder.done("regrid region.zarr -o region.fits --nside 256");
     assert!(out.contains("interpolated (bilinear, without the outer halves of the outermost cells): "), "{out}");
 }
@@ -178,7 +193,7 @@ fn a_run_goes_on_only_with_maps_that_came_to_healpix_alike() {
     let folder = with_fields();
     for (input, named, other, way) in [
         ("grid.nc", "--method bilinear", "--method conservative", "bilinear"),
-        ("points.csv", "", "--gather mean", "gaussian:5"),
+        ("points.csv", "", "--gather mean", "gaussian:4.9"),
     ] {
         for output in ["a.fits", "a.nc"] {
             let map = |options: &str| format!("map {input} -o {output} --window 15 --nside 64 {options}");
@@ -194,7 +209,7 @@ fn a_run_goes_on_only_with_maps_that_came_to_healpix_alike() {
     let at = made_before.windows(9).position(|card| card == b"REGRID  =").unwrap();
     let renamed = [&made_before[..at], b"OLDGRID =", &made_before[at + 9..]].concat();
     folder.write("a.fits", &renamed);
-    folder.refused("map points.csv -o a.fits --window 15 --nside 64 --resume", &["none", "'gaussian:5"]);
+    folder.refused("map points.csv -o a.fits --window 15 --nside 64 --resume", &["none", "'gaussian:4.9'"]);
 }
 
 #[test]
@@ -210,7 +225,10 @@ fn maps_that_came_to_healpix_otherwise_are_not_compared() {
     std::fs::copy(folder.path("two.fits"), folder.path("three.fits")).unwrap();
     folder.done("compare one.fits two.fits three.fits -o d.fits");
     assert_eq!(folder.headers("d.fits")[0]["REGRID"], "bilinear");
-    folder.refused("compare one.fits two.fits steps.fits -o e.fits", &["one.fits", "bilinear", "steps.fits", "conservative"]);
+    folder.refused(
+        "compare one.fits two.fits steps.fits -o e.fits",
+        &["one.fits", "bilinear", "steps.fits", "conservative"],
+    );
     // A map that was HEALPix, or made before this was said, is warned of.
     folder.done("regrid grid.nc -o grid.fits --nside 64");
     folder.done("map grid.fits -o healpix.fits --window 15");
@@ -222,55 +240,8 @@ fn maps_that_came_to_healpix_otherwise_are_not_compared() {
     Layout::of(1.25).write(&folder.path("fine.nc"), |_, latitude, longitude| smooth(latitude, longitude));
     folder.done("map fine.nc -o fine.fits --window 15 --nside 64 --method bilinear");
     let ran = folder.run("compare one.fits two.fits fine.fits -o g.fits");
-    assert!(ran.code == Some(0) && ran.err.starts_with("warning: the input of one.fits has another spacing"), "{ran:?}");
-}
-
-#[test]
-#[ignore]
-fn measure() {
-    let folder = Folder::new();
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut normal = || (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
-    for correlation in [5.0f64, 10.0, 20.0] {
-        let waves: Vec<([f64; 3], f64)> = (0..200).map(|_| ([(); 3].map(|()| normal() * 2f64.sqrt() / correlation.to_radians() / 2f64.sqrt()), normal() * 10.0)).collect();
-        let f = |lat: f64, lon: f64| {
-            let (lat, lon) = (lat.to_radians(), lon.to_radians());
-            let d = [lat.cos() * lon.cos(), lat.cos() * lon.sin(), lat.sin()];
-            waves.iter().map(|(k, p)| (k[0] * d[0] + k[1] * d[1] + k[2] * d[2] + p).cos()).sum::<f64>()
-        };
-        Layout::of(2.5).write(&folder.path("g.nc"), |_, a, b| f(a, b));
-        let length = |words: &str| {
-            let ran = folder.run(&format!("totals {words} --thresholds 0 --format json"));
-            let rows: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
-            rows[0]["length_rad"].as_f64().unwrap()
-        };
-        let mut rows = String::from("lon,lat,v\n");
-        for _ in 0..6600 {
-            let (lat, lon) = (rng2(&mut normal), 0.0);
-            let _ = lon;
-            let z: f64 = lat.0;
-            rows += &format!("{},{},{}\n", lat.1, z.asin().to_degrees(), f(z.asin().to_degrees(), lat.1));
-        }
-        folder.write("p.csv", rows.as_bytes());
-        let direct = |nside: usize| {
-            let grid = longan::formats::Healpix::new(nside).unwrap();
-            let values: Vec<f64> = (0..grid.pixels()).map(|p| { let (t, ph) = grid.centre(p); f(90.0 - t.to_degrees(), ph.to_degrees()) }).collect();
-            folder.write("d.fits", &map_file(&values, &[]));
-            length("d.fits")
-        };
-        let true_length = direct(512);
-        for nside in [16, 24, 32, 48, 64, 128, 256] {
-            let d = direct(nside);
-            let m = ["conservative", "bilinear"].map(|m| length(&format!("g.nc --nside {nside} --method {m}")));
-            let g = ["mean", "gaussian:2.5", "gaussian:3.8", "gaussian:5", "gaussian:6"].map(|m| length(&format!("p.csv --nside {nside} --gather {m}")));
-            eprintln!("corr {correlation} nside {nside}: vs true: direct {:+.3} cons {:+.3} bil {:+.3} | points {}", d / true_length - 1.0, m[0] / true_length - 1.0, m[1] / true_length - 1.0,
-                g.map(|g| format!("{:+.3}", g / true_length - 1.0)).join(" "));
-        }
-    }
-}
-
-fn rng2(normal: &mut impl FnMut() -> f64) -> (f64, f64) {
-    let v = [(); 3].map(|()| normal());
-    let r = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    (v[2] / r, v[1].atan2(v[0]).to_degrees())
+    assert!(
+        ran.code == Some(0) && ran.err.starts_with("warning: the input of one.fits has another spacing"),
+        "{ran:?}"
+    );
 }

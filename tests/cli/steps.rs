@@ -25,7 +25,8 @@ fn with_series() -> Folder {
     folder
 }
 
-const WARNING: &str = "warning: series.nc: the map at 1997-12-04 is masked or constant, so the result is masked there\n";
+const WARNING: &str =
+    "warning: series.nc: the map at 1997-12-04 is masked or constant, so the result is masked there\n";
 
 /// All steps of a variable.
 pub(super) fn steps(folder: &Folder, name: &str, variable: &str) -> Vec<Map> {

@@ -146,8 +146,11 @@ fn coincident_points() {
     // Twice the same place, written in two ways, and another one.
     let text = "lon,lat,v\n0,45,1\n360,45,3\n90,-45,10\n";
     let at = |gather| {
-        let map =
-            read_with(text.as_bytes(), &nside(1, Regrid { gather: Some(gather), reach: Some(180.0), ..Regrid::default() })).unwrap();
+        let map = read_with(
+            text.as_bytes(),
+            &nside(1, Regrid { gather: Some(gather), reach: Some(180.0), ..Regrid::default() }),
+        )
+        .unwrap();
         map.values()[map.grid().pixel_at(45f64.to_radians(), 0.0)]
     };
     assert_eq!(at(Gather::Mean), 2.0);
