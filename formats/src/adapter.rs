@@ -14,7 +14,7 @@ use flate2::read::MultiGzDecoder;
 
 use crate::csv::PointsCsv;
 use crate::healpix_fits::HealpixFits;
-use crate::map::Time;
+use crate::map::{Sphere, Time};
 use crate::netcdf::Netcdf;
 use crate::ply::SurfacePly;
 use crate::zarr::{self, ZarrStore};
@@ -165,10 +165,34 @@ impl Room {
     }
 }
 
+/// What maps are, as it shows before one is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct About {
+    /// The field's name, as the file has it.
+    pub name: String,
+    /// Its unit, as the file has it.
+    pub unit: Option<String>,
+    /// The coordinate system, where the file names one.
+    pub coordinates: Option<CoordinateSystem>,
+    /// What the sphere is.
+    pub sphere: Sphere,
+}
+
+impl About {
+    /// Says it of a map.
+    pub(crate) fn label(self, map: &mut Map) {
+        let About { name, unit, coordinates, sphere } = self;
+        (map.name, map.unit, map.coordinates, map.sphere) = (name, unit, coordinates, sphere);
+    }
+}
+
 /// The maps that a selection names: one, or one for each step in time, all on one grid.
 pub trait Maps {
     /// The times of the steps; one map without a time has none and counts as one step.
     fn times(&self) -> &[Time];
+
+    /// What they are.
+    fn about(&self) -> About;
 
     /// What they take; nothing where that does not show before one is read.
     fn room(&self) -> Option<Room>;

@@ -2,6 +2,7 @@
 //!
 //! What else columns may be (coordinates, colours) is left to the adapters.
 
+use crate::names::is_alike;
 use crate::{Description, Error, Field, FieldDescription, GridDescription, Selection, TableDescription, TablePlace};
 
 /// A column.
@@ -47,9 +48,7 @@ pub(crate) fn choose(columns: &[Column], field: Option<&Field>) -> Result<usize,
 fn named(columns: &[Column], name: &str) -> Vec<usize> {
     let name = name.trim();
     let matches: [&dyn Fn(&Column) -> bool; 4] =
-        [&|c| c.heading == name, &|c| c.name == name, &|c| c.heading.to_lowercase() == name.to_lowercase(), &|c| {
-            c.name.to_lowercase() == name.to_lowercase()
-        }];
+        [&|c| c.heading == name, &|c| c.name == name, &|c| is_alike(&c.heading, name), &|c| is_alike(&c.name, name)];
     let found = matches.iter().map(|matches| (0..columns.len()).filter(|&i| matches(&columns[i])).collect::<Vec<_>>());
     found.into_iter().find(|found| !found.is_empty()).unwrap_or_default()
 }

@@ -12,7 +12,8 @@ use crate::columns::{self, Column, shown};
 use crate::directions::{self, FARTHEST, at, from_centre};
 use crate::points::Samples;
 use crate::{
-    Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad,
+    About, Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN,
+    is_bad,
 };
 
 /// What may part cells.
@@ -88,6 +89,17 @@ impl Maps for One {
         &[]
     }
 
+    fn about(&self) -> About {
+        let Header { columns, system, position, .. } = &self.table.header;
+        let Column { name, unit, .. } = columns[self.values].clone();
+        let sphere = match position {
+            Position::Cartesian(_) => Sphere::Body,
+            Position::Angles { .. } if system.is_some() => Sphere::Sky,
+            Position::Angles { .. } => Sphere::Earth,
+        };
+        About { name, unit, coordinates: *system, sphere }
+    }
+
     fn room(&self) -> Option<Room> {
         // Direction and value, and the directions once more in a tree.
         Room::of_points(self.nside, self.samples.values.len(), 128)
@@ -95,15 +107,7 @@ impl Maps for One {
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
         let mut map = self.samples.gather(self.nside, &self.regrid)?;
-        let Header { columns, system, position, .. } = &self.table.header;
-        map.name = columns[self.values].name.clone();
-        map.unit = columns[self.values].unit.clone();
-        map.coordinates = *system;
-        map.sphere = match position {
-            Position::Cartesian(_) => Sphere::Body,
-            Position::Angles { .. } if system.is_some() => Sphere::Sky,
-            Position::Angles { .. } => Sphere::Earth,
-        };
+        self.about().label(&mut map);
         Ok(map)
     }
 

@@ -29,9 +29,7 @@ pub enum Error {
         pixels: usize,
     },
     /// A mask on another grid than its map.
-    #[error(
-        "the mask has Nside {mask} but the map has Nside {map}; bring the mask to Nside {map} first (for example with healpy.ud_grade)"
-    )]
+    #[error("the mask has Nside {mask} but the map has Nside {map}; bring the mask to Nside {map} first")]
     MaskNside {
         /// Nside of the map.
         map: usize,
@@ -226,6 +224,16 @@ pub enum Error {
         /// The name or number asked for.
         field: String,
         /// The fields of the table.
+        fields: String,
+    },
+    /// A name that several fields have.
+    #[error("'{field}' could be any of the fields {fields} of HDU {hdu}; choose one by its number")]
+    SeveralFields {
+        /// The HDU.
+        hdu: usize,
+        /// The name asked for.
+        field: String,
+        /// The fields that have it.
         fields: String,
     },
     /// A column that does not hold real numbers.

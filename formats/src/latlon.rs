@@ -7,8 +7,9 @@ use std::rc::Rc;
 
 use crate::cf::{self, Horizontal};
 use crate::dataset::{Dataset, Kind, Variable};
+use crate::names::is_alike;
 use crate::{
-    AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Room, Selection, Sphere,
+    About, AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Room, Selection, Sphere,
     TableDescription, Time, Weights,
 };
 
@@ -71,6 +72,12 @@ impl Maps for Series {
         self.chosen.times()
     }
 
+    fn about(&self) -> About {
+        let variable = &self.dataset.variables()[self.variable];
+        let (name, unit) = (variable.name.clone(), variable.text("units").map(str::to_owned));
+        About { name, unit, coordinates: None, sphere: Sphere::Earth }
+    }
+
     fn room(&self) -> Option<Room> {
         let (values, pixels) = (self.from.values() as f64, self.to.pixels() as f64);
         let weights = match self.selection.regrid.method {
@@ -93,11 +100,9 @@ impl Maps for Series {
         };
         let mut map = Map::from_masked(self.to, weights.apply(&values, regrid.min_valid));
         let variable = &self.dataset.variables()[self.variable];
-        map.name.clone_from(&variable.name);
-        map.unit = variable.text("units").map(str::to_owned);
         map.long_name = variable.text("long_name").map(str::to_owned);
         map.time = self.times().get(step).cloned();
-        map.sphere = Sphere::Earth;
+        self.about().label(&mut map);
         Ok(map)
     }
 
@@ -175,7 +180,7 @@ fn choose(dataset: &dyn Dataset, field: Option<&Field>) -> Result<OnGrid, Error>
         // A name is enough, a path is surer.
         let path = name.trim_start_matches('/');
         let tests: [&dyn Fn(&Variable) -> bool; 3] =
-            [&|v| v.path() == path, &|v| v.name == *name, &|v| v.name.eq_ignore_ascii_case(name)];
+            [&|v| v.path() == path, &|v| v.name == *name, &|v| is_alike(&v.name, name)];
         for test in tests {
             let mut places = (0..variables.len()).filter(|&place| test(&variables[place]));
             let Some(place) = places.next() else { continue };

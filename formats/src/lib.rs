@@ -21,6 +21,7 @@ mod latlon;
 mod libnetcdf;
 mod map;
 mod multi_order;
+mod names;
 mod netcdf;
 mod netcdf_write;
 mod ply;
@@ -28,18 +29,21 @@ mod points;
 mod regrid;
 mod save;
 mod surface;
+mod units;
 mod zarr;
 mod zarr_zstd;
 
 pub use adapter::{
-    Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather, GridDescription,
-    Indexing, Maps, Method, Place, Regrid, Room, Selection, TableDescription, TablePlace, describe, is_store, open,
-    read,
+    About, Adapter, At, AxisDescription, Description, DimensionDescription, Field, FieldDescription, Gather,
+    GridDescription, Indexing, Maps, Method, Place, Regrid, Room, Selection, TableDescription, TablePlace, describe,
+    is_store, open, read,
 };
 pub use error::{Error, Percent};
 pub use healpix::{Healpix, NSIDE_MAX, Ordering, Ring};
 pub use healpix_fits::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 pub use map::{BAD_DATA_TOLERANCE, CoordinateSystem, Map, Sphere, Time, UNSEEN, is_bad};
+pub use names::is_alike;
 pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
 pub use regrid::{LatLon, Weights};
 pub use save::{abandon, check_writable, save, tidy};
+pub use units::differ as units_differ;

@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::columns::{self, Column, shown};
 use crate::directions::FARTHEST;
 use crate::surface::Surface;
-use crate::{Adapter, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad};
+use crate::{About, Adapter, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad};
 
 /// No line of a header is longer than this, and no number in a text.
 const LONGEST: u64 = 1 << 16;
@@ -92,6 +92,10 @@ impl Maps for One {
         &[]
     }
 
+    fn about(&self) -> About {
+        About { name: self.name.clone(), unit: None, coordinates: None, sphere: Sphere::Body }
+    }
+
     fn room(&self) -> Option<Room> {
         // Position and value of a vertex, its two triangles, and all as seen from the centre, with boxes about triangles.
         Room::of_points(self.nside, self.surface.vertices.len(), 512)
@@ -99,8 +103,7 @@ impl Maps for One {
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
         let mut map = self.surface.map(self.nside, &self.regrid)?;
-        map.name = self.name.clone();
-        map.sphere = Sphere::Body;
+        self.about().label(&mut map);
         Ok(map)
     }
 

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use crate::plugin::{Plugin, PluginMeasure};
-use crate::registry::names_like;
+use crate::registry::{names_like, usual};
 use crate::{Formula, FormulaError, Measure, UnknownMeasure, find};
 
 /// The plugins of a run, beside the built-in measures.
@@ -92,7 +92,8 @@ impl Catalogue {
         if text.contains('=') {
             return Ok(Arc::new(Formula::new(text)?));
         }
-        if let Some((first, name)) = text.split_once(':') {
+        let usual = usual(text);
+        if let Some((first, name)) = usual.split_once(':') {
             if first == BUILT_IN {
                 return Ok(Arc::new(find(name)?));
             }
@@ -102,7 +103,7 @@ impl Catalogue {
             return Ok(Arc::new(measure.clone().renamed(self.name_of(plugin, measure))));
         }
         let built_in = find(text);
-        let mut named = self.named(text);
+        let mut named = self.named(&usual);
         match (built_in, named.next(), named.next()) {
             (Ok(measure), None, _) => Ok(Arc::new(measure)),
             (Err(_), Some((_, measure)), None) => Ok(Arc::new(measure.clone())),
@@ -111,8 +112,8 @@ impl Catalogue {
             }
             (Err(_), None, _) => Err(self.unknown(text).into()),
             (built_in, ..) => {
-                let built_in = built_in.ok().map(|_| format!("{BUILT_IN}:{text}"));
-                let plugins = self.named(text).map(|(plugin, _)| format!("{}:{text}", plugin.name()));
+                let built_in = built_in.ok().map(|_| format!("{BUILT_IN}:{usual}"));
+                let plugins = self.named(&usual).map(|(plugin, _)| format!("{}:{usual}", plugin.name()));
                 let names = built_in.into_iter().chain(plugins).map(|name| format!("'{name}'")).collect();
                 Err(CatalogueError::Ambiguous { name: text.to_owned(), names })
             }
@@ -169,6 +170,7 @@ mod tests {
         let catalogue = Catalogue::default();
         let name = |text: &str| catalogue.find(text).map(|measure| measure.name()).map_err(|e| e.to_string());
         assert_eq!(name(" evq ").as_deref(), Ok("evq"));
+        assert_eq!(name("Longan:Psi2_Direction").as_deref(), Ok("psi2-direction"));
         assert_eq!(name("longan:psi3").as_deref(), Ok("psi3"));
         assert_eq!(name("x = w1").as_deref(), Ok("x"));
         assert!(name("w1 + w2").unwrap_err().contains("as in 'beta = w1 + w2'"));

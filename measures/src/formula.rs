@@ -502,7 +502,7 @@ fn written(name: &str) -> String {
 
 /// The built-in measure of this name, however its words are joined.
 fn known(name: &str) -> Option<BuiltIn> {
-    find(&name.replace('_', "-")).ok()
+    find(name).ok()
 }
 
 /// What a name stands for.

@@ -32,7 +32,7 @@ use num_complex::Complex64;
 
 pub use catalogue::{Catalogue, CatalogueError, split};
 pub use formula::{Formula, FormulaError};
-pub use registry::{BUILT_INS, BuiltIn, Kind, UnknownMeasure, find};
+pub use registry::{BUILT_INS, BuiltIn, Kind, UnknownMeasure, find, usual};
 
 /// What the contour's pieces weigh in the moments ψ_s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

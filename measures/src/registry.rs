@@ -103,8 +103,9 @@ pub struct UnknownMeasure {
 impl UnknownMeasure {
     /// A name that is none of the known ones.
     pub(crate) fn new(name: &str, known: impl Iterator<Item = String>) -> Self {
+        let usual = usual(name);
         let nearest = known
-            .map(|known| (strsim::damerau_levenshtein(&known, name), known))
+            .map(|known| (strsim::damerau_levenshtein(&known, &usual), known))
             .min()
             .filter(|(distance, known)| 2 * distance <= known.len())
             .map(|(_, known)| known);
@@ -112,12 +113,19 @@ impl UnknownMeasure {
     }
 }
 
-/// The built-in measure of this name.
+/// A name as measures have it, in small letters and with hyphens, however it is typed: `EVQ` is `evq`,
+/// `Psi2_Direction` is `psi2-direction`.
+pub fn usual(name: &str) -> String {
+    name.trim().to_lowercase().replace('_', "-")
+}
+
+/// The built-in measure of this [`usual`] name.
 ///
 /// # Errors
 /// [`UnknownMeasure`], with the nearest name.
 pub fn find(name: &str) -> Result<BuiltIn, UnknownMeasure> {
-    let found = BUILT_INS.iter().find_map(|&kind| named(kind, name));
+    let usual = usual(name);
+    let found = BUILT_INS.iter().find_map(|&kind| named(kind, &usual));
     found.ok_or_else(|| UnknownMeasure::new(name, names_like(name)))
 }
 
@@ -147,6 +155,9 @@ mod tests {
         for name in ["w0", "evq-direction", "psi1", "psi17-direction", "q2", "rank4-mid", "contour-length"] {
             assert_eq!(find(name).unwrap().name(), name);
         }
+        for name in ["EVQ", "Rank4_Mid", " psi2_direction ", "PSI2-Direction"] {
+            assert_eq!(find(name).unwrap().name(), usual(name));
+        }
         assert_eq!(find("psi12-direction").unwrap().column(), "PSI12_DIRECTION");
         assert_eq!(find("psi4").unwrap().rank(), 4);
     }
@@ -158,7 +169,7 @@ mod tests {
         assert_eq!(nearest("psi3-directon").as_deref(), Some("psi3-direction"));
         assert_eq!(nearest("psi0").as_deref(), Some("psi2"));
         assert_eq!(nearest("psi03").as_deref(), Some("psi3"));
-        for name in ["psi0", "psi", "psi-1", "psi02", "psi99999999999", "EVQ", "", "psi2x", "psiN"] {
+        for name in ["psi0", "psi", "psi-1", "psi02", "psi99999999999", "e-v-q", "", "psi2x", "psiN"] {
             assert!(find(name).is_err(), "{name}");
         }
         assert_eq!(nearest("temperature"), None);

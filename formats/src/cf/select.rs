@@ -12,6 +12,7 @@ use crate::Error;
 use crate::adapter::{At, Place};
 use crate::dataset::{Array, Dataset, Dimension, Kind, Variable};
 use crate::map::Time;
+use crate::names::is_alike;
 
 /// A number names a coordinate value within this part of it, so that 0.1 finds 0.1 in single precision.
 const VALUE_TOLERANCE: f64 = 1e-6;
@@ -248,8 +249,8 @@ fn dimension_named(dataset: &dyn Dataset, variable: &Variable, name: &str) -> Re
     let coordinate = |d: &Dimension| coordinate_of(dataset, variable, d).map(|v| v.name.as_str());
     let named = position(&|d| d.name == name)
         .or_else(|| position(&|d| coordinate(d) == Some(name)))
-        .or_else(|| position(&|d| d.name.eq_ignore_ascii_case(name)))
-        .or_else(|| position(&|d| coordinate(d).is_some_and(|c| c.eq_ignore_ascii_case(name))));
+        .or_else(|| position(&|d| is_alike(&d.name, name)))
+        .or_else(|| position(&|d| coordinate(d).is_some_and(|c| is_alike(c, name))));
     named.ok_or_else(|| Error::NoSuchDimension {
         variable: variable.path(),
         dimension: name.escape_debug().to_string(),

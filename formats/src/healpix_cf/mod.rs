@@ -13,6 +13,7 @@ use std::rc::Rc;
 
 use crate::cf::{self, shape};
 use crate::dataset::{Dataset, Kind, Variable};
+use crate::names::is_alike;
 use crate::{Error, Field, Maps, Selection, TableDescription};
 use grid::Grid;
 
@@ -82,16 +83,21 @@ fn choose(dataset: &dyn Dataset, fields: &[usize], field: Option<&Field>) -> Res
             fields.get(*number).copied().map(Some).ok_or_else(|| unknown(&Field::Number(*number)))
         }
         Some(Field::Name(name)) => {
-            let exact = |place: &usize| variables[*place].name == *name || variables[*place].path() == *name;
-            let similar = |place: &usize| {
-                variables[*place].name.eq_ignore_ascii_case(name) || variables[*place].path().eq_ignore_ascii_case(name)
+            let exact = |variable: &Variable| variable.name == *name || variable.path() == *name;
+            let alike = |variable: &Variable| is_alike(&variable.name, name) || is_alike(&variable.path(), name);
+            let those = |is: &dyn Fn(&Variable) -> bool| -> Vec<usize> {
+                fields.iter().copied().filter(|&place| is(&variables[place])).collect()
             };
-            let all = 0..variables.len();
-            let found = fields.iter().copied().find(exact).or_else(|| fields.iter().copied().find(similar));
-            match found {
-                Some(place) => Ok(Some(place)),
-                None if all.into_iter().any(|place| similar(&place)) => Ok(None),
-                None => Err(unknown(&Field::Name(name.clone()))),
+            let same = those(&exact);
+            let found = if same.is_empty() { those(&alike) } else { same };
+            match found[..] {
+                [place] => Ok(Some(place)),
+                [] if variables.iter().any(alike) => Ok(None),
+                [] => Err(unknown(&Field::Name(name.clone()))),
+                [..] => {
+                    let variables = found.iter().map(describe).collect::<Vec<_>>().join("; ");
+                    Err(Error::SeveralVariables { variables: variables.replace(char::is_control, " ") })
+                }
             }
         }
     }

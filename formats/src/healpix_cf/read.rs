@@ -11,8 +11,8 @@ use crate::canvas::{CHUNK, Canvas};
 use crate::dataset::{Array, Attribute, Dataset, Variable};
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
 use crate::{
-    CoordinateSystem, Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Room, Selection, Sphere, Time,
-    UNSEEN, cf, is_bad,
+    About, CoordinateSystem, Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Room, Selection, Sphere,
+    Time, UNSEEN, cf, is_bad,
 };
 
 /// Finds what is selected of a field.
@@ -78,6 +78,14 @@ impl Maps for Field {
         self.chosen.times()
     }
 
+    fn about(&self) -> About {
+        let variable = &self.dataset.variables()[self.variable];
+        let (name, unit) = (variable.name.clone(), variable.text("units").map(str::to_owned));
+        let coordinates = coordinates(&*self.dataset);
+        let sphere = if coordinates.is_some() { Sphere::Sky } else { Sphere::Earth };
+        About { name, unit, coordinates, sphere }
+    }
+
     fn room(&self) -> Option<Room> {
         let (grid, cells) = match &self.cells {
             Cells::All(grid, _) => (*grid, grid.pixels()),
@@ -129,13 +137,10 @@ impl Maps for Field {
             }
         };
         let mut map = Map::from_masked(canvas.grid, canvas.values);
-        map.name = variable.name.clone();
-        map.unit = variable.text("units").map(str::to_owned);
+        self.about().label(&mut map);
         map.long_name = variable.text("long_name").or(variable.text("standard_name")).map(str::to_owned);
         map.ordering = ordering;
         map.time = self.chosen.times().get(step).cloned();
-        map.coordinates = coordinates(&*self.dataset);
-        map.sphere = if map.coordinates.is_some() { Sphere::Sky } else { Sphere::Earth };
         Ok(map)
     }
 }

@@ -18,7 +18,7 @@ use tempfile::NamedTempFile;
 
 use crate::adapter::{gunzipped_head, is_gzip};
 use crate::cfitsio::FitsReader;
-use crate::{Adapter, Description, Error, Healpix, Map, Maps, Room, Selection, Time};
+use crate::{About, Adapter, Description, Error, Healpix, Map, Maps, Room, Selection, Sphere, Time};
 
 pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 
@@ -51,7 +51,8 @@ impl Adapter for HealpixFits {
         let mut fits = open(path)?;
         let hdu = scan::choose(&mut fits, selection.hdu)?;
         let table = table::Table::parse(&mut fits, hdu)?;
-        Ok(Box::new(One { fits, table, selection: selection.clone() }))
+        let column = table.column(selection.field.as_ref())?.clone();
+        Ok(Box::new(One { fits, table, column, selection: selection.clone() }))
     }
 }
 
@@ -59,6 +60,7 @@ impl Adapter for HealpixFits {
 struct One {
     fits: FitsReader,
     table: table::Table,
+    column: table::Column,
     selection: Selection,
 }
 
@@ -67,8 +69,13 @@ impl Maps for One {
         &[]
     }
 
+    fn about(&self) -> About {
+        let (name, unit) = (self.column.name.clone(), self.column.unit.clone());
+        About { name, unit, coordinates: self.table.coordinates, sphere: Sphere::Sky }
+    }
+
     fn room(&self) -> Option<Room> {
-        let column = self.table.column(self.selection.field.as_ref()).ok()?;
+        let column = &self.column;
         let grid = match &self.table.layout {
             table::Layout::Implicit { named } => self.table.implicit(column, *named).ok()?.0,
             table::Layout::Explicit { index, .. } => self.table.explicit_grid(index).ok()?,
@@ -84,7 +91,9 @@ impl Maps for One {
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
-        read::read(&mut self.fits, &self.table, &self.selection)
+        let mut map = read::read(&mut self.fits, &self.table, &self.column, &self.selection)?;
+        self.about().label(&mut map);
+        Ok(map)
     }
 }
 

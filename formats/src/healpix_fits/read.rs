@@ -9,8 +9,7 @@ use crate::cfitsio::FitsReader;
 use crate::{Error, Field, Map, Ordering, Selection, UNSEEN, is_bad};
 
 /// Reads one field of a table.
-pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) -> Result<Map, Error> {
-    let column = table.column(selection.field.as_ref())?;
+pub(super) fn read(fits: &mut FitsReader, table: &Table, column: &Column, selection: &Selection) -> Result<Map, Error> {
     if let (Some(nside), Layout::Implicit { .. } | Layout::Explicit { .. }) = (selection.nside, &table.layout) {
         return Err(Error::NotMultiOrder { hdu: table.hdu, nside });
     }
@@ -20,9 +19,6 @@ pub(super) fn read(fits: &mut FitsReader, table: &Table, selection: &Selection) 
         Layout::MultiOrder { index } => multi_order::read(fits, table, column, index, selection.nside)?,
     };
     let mut map = Map::from_masked(canvas.grid, canvas.values);
-    map.name = column.name.clone();
-    map.unit = column.unit.clone();
-    map.coordinates = table.coordinates;
     map.ordering = table.ordering;
     Ok(map)
 }

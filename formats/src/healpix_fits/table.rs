@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use super::multi_order;
 use crate::cfitsio::FitsReader;
+use crate::names;
 use crate::{
     Card, CardValue, CoordinateSystem, Error, Field, FieldDescription, GridDescription, Healpix, Indexing, Ordering,
     TableDescription, TablePlace,
@@ -230,27 +231,32 @@ impl Table {
 
     /// The data column that a field is in, known to hold numbers.
     pub(super) fn column(&self, field: Option<&Field>) -> Result<&Column, Error> {
-        let by_name = |name: &str| {
-            let mut columns = self.columns.iter();
-            columns.clone().find(|c| c.name == name).or_else(|| columns.find(|c| c.name.eq_ignore_ascii_case(name)))
+        let listed = |places: &mut dyn Iterator<Item = usize>| {
+            places.map(|i| format!("{i} '{}'", self.columns[i].name)).collect::<Vec<_>>().join(", ")
+        };
+        let by_name = |name: &str| match names::meant(self.columns.iter().map(|c| &*c.name), name)[..] {
+            [] => Ok(None),
+            [only] => Ok(Some(&self.columns[only])),
+            ref several => Err(Error::SeveralFields {
+                hdu: self.hdu,
+                field: name.escape_debug().to_string(),
+                fields: listed(&mut several.iter().copied()),
+            }),
         };
         let column = match field {
             None => self.columns.first(),
-            Some(Field::Name(name)) => by_name(name),
+            Some(Field::Name(name)) => by_name(name)?,
             // Here a number names a plane.
             Some(Field::Number(_)) if self.sparse => self.columns.first(),
-            Some(Field::Number(number)) => self.columns.get(*number).or_else(|| by_name(&number.to_string())),
+            Some(Field::Number(number)) => match self.columns.get(*number) {
+                None => by_name(&number.to_string())?,
+                column => column,
+            },
         };
         let column = column.ok_or_else(|| Error::UnknownField {
             hdu: self.hdu,
             field: field.map(Field::to_string).unwrap_or_default(),
-            fields: self
-                .columns
-                .iter()
-                .enumerate()
-                .map(|(i, c)| format!("{i} '{}'", c.name))
-                .collect::<Vec<_>>()
-                .join(", "),
+            fields: listed(&mut (0..self.columns.len())),
         })?;
         column.check(self.hdu)?;
         Ok(column)
