@@ -12,7 +12,7 @@ use crate::contour::{Body, Field};
 use crate::moments::{Layout, Selection, Weight};
 use crate::region::Region;
 use crate::statistics::{Statistics, statistics};
-use crate::thresholds::{ThresholdError, Thresholds};
+use crate::thresholds::{Doubt, ThresholdError, Thresholds};
 use crate::totals::{Regional, Totals, totals, totals_within};
 use crate::window::{self, Moments, MovingWindows, Summation, Ways, Windows};
 
@@ -253,6 +253,18 @@ impl Analysis {
             },
         };
         Ok((thresholds, of_map))
+    }
+
+    /// What makes one doubt that the thresholds are meant for a field. In standard deviations they may lie as close
+    /// together as they like.
+    pub fn doubt(&self, map: &Map) -> Option<Doubt> {
+        let in_sigma = self.threshold_unit == ThresholdUnit::Sigma;
+        // The mean lies within the values, so there is no need to look at them.
+        if in_sigma && self.thresholds.values().contains(&0.0) {
+            return None;
+        }
+        let (thresholds, of_map) = self.thresholds_of(map).ok()?;
+        thresholds.doubt(of_map).filter(|doubt| !in_sigma || matches!(doubt, Doubt::Missed { .. }))
     }
 
     /// Minkowski maps, for each window: each measure about all pixels of the output grid, averaged over the thresholds.

@@ -15,9 +15,11 @@ fn plain(name: &str) -> impl Iterator<Item = char> {
 
 /// The places of the names that are meant: all that are the same, or where there is none, all that are alike.
 pub(crate) fn meant<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> Vec<usize> {
-    let those = |is: &dyn Fn(&str) -> bool| names.clone().enumerate().filter(|(_, name)| is(name)).map(|(i, _)| i);
-    let same: Vec<usize> = those(&|name| name == wanted).collect();
-    if same.is_empty() { those(&|name| is_alike(name, wanted)).collect() } else { same }
+    let those = |is: fn(&str, &str) -> bool| -> Vec<usize> {
+        names.clone().enumerate().filter(|(_, name)| is(name, wanted)).map(|(i, _)| i).collect()
+    };
+    let same = those(|name, wanted| name == wanted);
+    if same.is_empty() { those(is_alike) } else { same }
 }
 
 #[cfg(test)]

@@ -507,7 +507,8 @@ fn known(name: &str) -> Option<BuiltIn> {
 
 /// What a name stands for.
 fn input(name: &str) -> Option<Input> {
-    let Some((moment, part)) = name.split_once('.') else { return known(name).map(Input::Measure) };
+    let name = name.to_lowercase();
+    let Some((moment, part)) = name.split_once('.') else { return known(&name).map(Input::Measure) };
     let digits = moment.strip_prefix("psi")?;
     let rank: u32 = digits.parse().ok()?;
     match part {
@@ -631,7 +632,7 @@ mod tests {
             ("beta = (w1 - psy2)/w1", 13..17, &["no measure or moment 'psy2'", "did you mean 'psi2'"][..]),
             ("x = psi03.re", 4..12, &["'psi3.re'"]),
             ("x = psi2.real", 4..13, &["'psi2.re'"]),
-            ("x = PSI2", 4..8, &["'psi2'"]),
+            ("x = PSJ2", 4..8, &["'psi2'"]),
             ("x = rank4-mid", 4..13, &["a hyphen is a subtraction", "'rank4_mid'"]),
             ("x = 1 + psi2-direction", 8..22, &["'psi2_direction'"]),
             ("x = sqr(w1)", 4..7, &["no function 'sqr'", "'sqrt'"]),

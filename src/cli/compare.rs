@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
+use longan::ThresholdUnit;
 use longan::compare::{Ensemble, Rank, peaks};
 use longan::formats::{self, Card, Error, Healpix};
 use longan::measures::Measure;
@@ -21,9 +22,10 @@ use longan::smoothing::Smoothing;
 
 use super::jobs::Jobs;
 use super::mapping::Mapping;
+use super::mismatch::Together;
 use super::misused;
 use super::options::{Format, Running, between, check_memory, print, shown, whole};
-use super::output::{card, command, creator, integer, numbered, real, text};
+use super::output::{command, creator, integer, numbered, real, text};
 use super::progress::Progress;
 use super::sink::{self, Kind, MapColumn, Step, Table};
 use report::{OfMeasure, Region, Report};
@@ -52,7 +54,9 @@ Examples:
   longan compare maps/sky.fits maps/sim*.fits -o deviation.fits --scatter 264,-17 evq,rank4-mid
   longan compare sky.fits sims/*.fits -o deviation.fits --work work/ --window 10 --mask mask.fits
 
-Inputs are Minkowski maps of longan, all made in the same way, of any ordering; their masks may differ. With --work they \
+Inputs are Minkowski maps of longan, all made in the same way, of any ordering; their masks may differ. Of several windows \
+and thresholds in a file each is compared: EVQ_WINDOW_4_THRESHOLD_1 is the first threshold of EVQ in windows of 4 \
+degrees, and --measure evq is all of them. With --work they \
 are maps of any kind, of which Minkowski maps are made first, by the options of `longan map`, in that folder; those that \
 it holds already, made by the same options, are not made again. Direction measures are angles and are not compared.")]
 pub(crate) struct Arguments {
@@ -104,7 +108,7 @@ pub(crate) struct Arguments {
 }
 
 /// Options that make sense without --work. All others say how Minkowski maps are made.
-const WITHOUT_WORK: [&str; 18] = [
+const WITHOUT_WORK: [&str; 19] = [
     "data",
     "simulations",
     "output",
@@ -118,6 +122,7 @@ const WITHOUT_WORK: [&str; 18] = [
     "overwrite",
     "measure",
     "hdu",
+    "ignore_coordsys",
     "ordering",
     "float32",
     "threads",
@@ -133,17 +138,30 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(folder) => {
             let inputs: Vec<&Path> = arguments.inputs().collect();
             let measures = arguments.mapping.measures("compare")?;
-            let column =
-                |measure: &Arc<dyn Measure>| Column { name: measure.column(), unit: measure.unit().to_owned() };
+            let column = |measure: &Arc<dyn Measure>| Column::to_be(measure.column(), measure.unit());
             let columns: Vec<Column> = measures.iter().map(column).collect();
             columns.iter().try_for_each(Column::check)?;
-            scatter.as_ref().map(|scatter| scatter.pair(&columns)).transpose()?;
-            work::minkowski_maps(folder, &inputs, &arguments.mapping, measures, &arguments.jobs, &arguments.running)?
+            arguments.check_together(&inputs)?;
+            let made = |inputs: &[&Path]| {
+                let (mapping, jobs, running) = (&arguments.mapping, &arguments.jobs, &arguments.running);
+                work::minkowski_maps(folder, inputs, mapping, measures.clone(), jobs, running)
+            };
+            if let Some(scatter) = &scatter {
+                // Whether the place is masked shows before all simulations are measured.
+                scatter.check_among(&columns)?;
+                let data = made(&inputs[..1])?.pop().context("data")?;
+                scatter.check(&data)?;
+            }
+            made(&inputs)?
         }
         None => arguments.said()?,
     };
     let (data, simulations) = files.split_first().context("data")?;
-    simulations.iter().try_for_each(|simulation| data.check(simulation))?;
+    let ignore_coordsys = arguments.mapping.input().ignore_coordsys;
+    simulations.iter().try_for_each(|simulation| data.check(simulation, ignore_coordsys))?;
+    if let Some(difference) = simulations.iter().find_map(|simulation| data.masked_otherwise(simulation)) {
+        arguments.running.warn(format_args!("{difference}; simulations should have gone through what the data has"));
+    }
     let columns = arguments.columns(&files)?;
     let pair = scatter.as_ref().map(|scatter| scatter.pair(&columns)).transpose()?;
     let grid = Healpix::new(data.nside)?;
@@ -159,14 +177,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ));
     }
 
-    if data.others > 0 {
-        arguments.running.warn(format_args!(
-            "{}: this has {} other extensions of Minkowski maps; --hdu chooses another one",
-            shown(&data.path),
-            data.others
-        ));
-    }
-
     let first = data.read(&columns[0])?;
     let layout = arguments.mapping.layout().layout(&first, grid, kind, 1).with_context(|| shown(&data.path))?;
     let read = |file: &Said| -> anyhow::Result<Vec<Vec<f64>>> {
@@ -176,13 +186,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
         smoothing.apply(&maps).with_context(|| shown(&file.path))
     };
-    let progress = Progress::new(shown(&arguments.data), arguments.running.quiet);
-    let steps = 2 * simulations.len();
     let mut ensembles: Vec<Ensemble> = read(data)?.into_iter().map(Ensemble::new).collect();
     let mut points = Vec::new();
     if let (Some(scatter), Some(pair)) = (&scatter, pair) {
         points.push(scatter.point(grid, pair.map(|i| ensembles[i].data())));
+        scatter.check_point(&data.path, grid, points[0], pair.map(|i| &columns[i]))?;
     }
+    let progress = Progress::new(shown(&arguments.data), arguments.running.quiet);
+    let steps = 2 * simulations.len();
     for (i, simulation) in simulations.iter().enumerate() {
         let maps = read(simulation)?;
         for (ensemble, map) in ensembles.iter_mut().zip(&maps) {
@@ -192,6 +203,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             points.push(scatter.point(grid, pair.map(|i| maps[i].as_slice())));
         }
         progress.set((i + 1) as f64 / steps as f64);
+    }
+    if let Some(scatter) = &scatter {
+        scatter.check_simulations(grid, &points[1..])?;
     }
     let mut largest = vec![Vec::new(); columns.len()];
     for (i, simulation) in simulations.iter().enumerate() {
@@ -214,7 +228,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let mut maps = Vec::new();
     for ((column, ensemble), largest) in columns.iter().zip(&ensembles).zip(largest) {
-        let (of, mut columns) = arguments.of_measure(grid, data, column, ensemble, largest);
+        let (of, mut columns) = arguments.of_measure(grid, column, ensemble, largest);
         report.measures.push(of);
         maps.append(&mut columns);
     }
@@ -288,6 +302,14 @@ impl Arguments {
         Ok(scatter)
     }
 
+    /// Refuses maps that do not go together, before they are measured.
+    fn check_together(&self, inputs: &[&Path]) -> anyhow::Result<()> {
+        let (mapping, input) = (&self.mapping, self.mapping.input());
+        let in_value = mapping.analysis().threshold_unit == ThresholdUnit::Value;
+        let mut together = Together::new(!input.ignore_coordsys, in_value);
+        inputs.iter().try_for_each(|path| together.add(path, &input.open(path)?.about()))
+    }
+
     /// What the files say of themselves: Minkowski maps, all of them.
     fn said(&self) -> anyhow::Result<Vec<Said>> {
         let hdu = self.mapping.input().hdu;
@@ -311,17 +333,23 @@ impl Arguments {
     /// The columns to compare: those asked for, or those that all files have.
     fn columns(&self, files: &[Said]) -> anyhow::Result<Vec<Column>> {
         let data = &files[0];
-        let lacking = |name: &str| files.iter().find(|file| !file.columns.iter().any(|column| column.is_called(name)));
+        let lacking = |column: &Column| files.iter().find(|file| !file.has(column));
         let asked: Vec<&str> = if self.work.is_some() { Vec::new() } else { self.mapping.names().collect() };
         let mut columns = Vec::new();
         for name in &asked {
-            if let Some(file) = lacking(name) {
-                bail!("{}: there is no measure '{name}'; there are {}", shown(&file.path), file.listed());
-            }
-            let column = data.columns.iter().find(|column| column.is_called(name)).context("a column")?;
-            column.check()?;
-            if !columns.contains(column) {
-                columns.push(column.clone());
+            let missing = |file: &Said| {
+                format!("{}: there is no measure '{name}'; there are {}", shown(&file.path), file.listed())
+            };
+            let mut called = data.columns.iter().filter(|column| column.is_called(name)).peekable();
+            ensure!(called.peek().is_some(), missing(data));
+            for column in called {
+                if let Some(file) = lacking(column) {
+                    bail!(missing(file));
+                }
+                column.check()?;
+                if !columns.contains(column) {
+                    columns.push(column.clone());
+                }
             }
         }
         if !asked.is_empty() {
@@ -329,7 +357,7 @@ impl Arguments {
         }
         let mut left_out = Vec::new();
         for column in &data.columns {
-            match lacking(&column.name) {
+            match lacking(column) {
                 Some(file) => {
                     left_out.push(format!("{}: {} has only {}", column.name, shown(&file.path), file.listed()));
                 }
@@ -343,7 +371,7 @@ impl Arguments {
             left_out.iter().for_each(|what| self.running.warn(format_args!("left out is {what}")));
         }
         if columns.is_empty() {
-            let other = data.columns.iter().find_map(|column| lacking(&column.name));
+            let other = data.columns.iter().find_map(lacking);
             match other {
                 Some(other) => bail!(
                     "{} has the measures {}, but {} has {}; compare maps of the same measures",
@@ -364,14 +392,13 @@ impl Arguments {
     fn of_measure(
         &self,
         grid: Healpix,
-        data: &Said,
         column: &Column,
         ensemble: &Ensemble,
         largest: Vec<Option<f64>>,
     ) -> (OfMeasure, Vec<MapColumn>) {
         let found = ensemble.deviation();
         let rank = ensemble.largest().map(|data| Rank::new(data, largest));
-        let window = data.window(&column.name);
+        let window = column.window.unwrap_or(0.0);
         let regions = peaks(grid, &found.sigma, 2.0 * window, self.level, self.regions);
         let regions = regions.iter().map(|peak| Region {
             lon_deg: peak.lon,
@@ -427,8 +454,7 @@ impl Arguments {
             real("SMOOTH", self.smooth.unwrap_or(0.0), "[deg] FWHM of the smoothing, 0: none"),
             text("TIES", "half", "an equal value counts one half in percentiles"),
         ];
-        let note = "of the map measured, or of how";
-        cards.extend(data.repeated.iter().map(|(key, value)| card(key, value.clone(), note)));
+        cards.extend(data.repeated.iter().cloned());
         for (n, of) in (1..).zip(&report.measures) {
             cards.push(text(&numbered("MEASURE", n), of.measure.clone(), "measure compared"));
             if let (Some(largest), Some(p)) = (of.largest_sigma, of.p_value) {

@@ -12,7 +12,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use longan::formats;
 use longan::gaussian::Gaussian;
-use longan::measures::{Measure, split};
+use longan::measures::{Measure, split, usual};
 use longan::picture::axes::PALETTE;
 use longan::region::RegionError;
 use longan::statistics::Statistics;
@@ -20,12 +20,13 @@ use longan::totals::Totals;
 use longan::{Analysis, AnalysisError, Body, Map, Region, ThresholdUnit};
 
 use super::drawn::{Form, save};
-use super::input::{Input, Mask, Series};
+use super::input::{Input, Mask, Series, of};
 use super::mapping::{find, no_measure};
-use super::misused;
+use super::mismatch::Together;
 use super::options::{BodyOptions, Running, WeightOption, between, check_memory, nside, shown};
 use super::plugin::Plugins;
 use super::progress::Progress;
+use super::{mismatch, misused};
 use ensemble::Ensemble;
 
 /// Measures of shape against threshold: a picture, and the numbers as CSV beside it.
@@ -185,8 +186,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let plan = arguments.plan()?;
     let outputs = arguments.outputs()?;
-    let mask = arguments.input.mask()?;
-    let (curves, simulations) = (arguments.maps_in(&arguments.inputs)?, arguments.maps_in(&arguments.ensemble)?);
+    let mask = arguments.input.mask(&arguments.running)?;
+    let mut together = Together::new(!arguments.input.ignore_coordsys, !plan.in_sigma());
+    let curves = arguments.maps_in(&arguments.inputs, mask.as_ref(), &mut together)?;
+    let simulations = arguments.maps_in(&arguments.ensemble, mask.as_ref(), &mut together)?;
     let all = curves + simulations;
     ensure!(
         outputs.picture.is_none() || curves <= PALETTE.len(),
@@ -248,7 +251,7 @@ impl Arguments {
             texts.extend(DENSITIES.map(|density| density.name));
         }
         for text in texts {
-            let density = DENSITIES.into_iter().find(|density| density.name == text.trim());
+            let density = DENSITIES.into_iter().find(|density| density.name == usual(text));
             let quantity = match density {
                 Some(density) => Quantity { name: density.name.to_owned(), kind: Kind::Density(density) },
                 None => {
@@ -315,9 +318,17 @@ impl Arguments {
         Ok(Outputs { picture, table })
     }
 
-    /// How many maps there are in files, once it is clear that all can be opened.
-    fn maps_in(&self, paths: &[PathBuf]) -> anyhow::Result<usize> {
-        paths.iter().map(|path| Ok(self.input.open(path)?.steps())).sum()
+    /// How many maps there are in files, once it is clear that all can be opened and go together.
+    fn maps_in(&self, paths: &[PathBuf], mask: Option<&Mask>, together: &mut Together) -> anyhow::Result<usize> {
+        let mut maps = 0;
+        for path in paths {
+            let series = self.input.open(path)?;
+            let about = series.about();
+            mask.map_or(Ok(()), |mask| mask.check(&about)).map_err(|problem| of(path, problem))?;
+            together.add(path, &about)?;
+            maps += series.steps();
+        }
+        Ok(maps)
     }
 
     /// The curves of one map; nothing, with a warning, of one among several steps that has nothing to measure.
@@ -331,6 +342,8 @@ impl Arguments {
         told: impl FnMut(f64),
     ) -> anyhow::Result<Option<Curves>> {
         let map = series.read(step, mask)?;
+        let several = self.inputs.len() + self.ensemble.len() > 1 || series.steps() > 1;
+        mismatch::warn(&self.running, path, &map, &plan.analysis, several);
         let curves = match plan.curves(path, &map, told) {
             Err(error) if series.steps() > 1 && nothing_to_measure(&error) => {
                 let when = map.time.map(|time| time.label).unwrap_or_default();

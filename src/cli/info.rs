@@ -101,7 +101,7 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
     let mut tables = Vec::new();
     for (place, table) in description.tables.iter().enumerate() {
         let mut fields = Vec::new();
-        let is_wanted = |name: &str| arguments.variable.as_ref().is_none_or(|wanted| wanted.eq_ignore_ascii_case(name));
+        let is_wanted = |name: &str| arguments.variable.as_ref().is_none_or(|wanted| formats::is_alike(wanted, name));
         let whole = matches!(&table.place, TablePlace::Variable { variable } if is_wanted(variable));
         for (i, field) in table.fields.iter().enumerate().filter(|(_, field)| whole || is_wanted(&field.name)) {
             let read = read(arguments, table, i);

@@ -6,9 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
-use longan::formats::{self, At, Error, Field, Gather, Healpix, Map, Maps, Method, Place, Regrid, Room, Selection};
+use longan::ThresholdUnit;
+use longan::formats::{
+    self, About, At, CoordinateSystem, Error, Field, Gather, Healpix, Map, Maps, Method, Place, Regrid, Room, Selection,
+};
 
-use super::options::{between, finite, nside, whole};
+use super::mismatch::{Together, of_coordinates};
+use super::options::{Running, Topic, between, finite, nside, shown, whole};
 
 /// Which map of a file, how it comes to HEALPix, and which pixels of it.
 #[derive(Args, Clone, Debug, PartialEq)]
@@ -31,8 +35,8 @@ pub(crate) struct Input {
     nside: Option<usize>,
     #[command(flatten)]
     regrid: RegridOptions,
-    /// Mask, of any format and ordering; one that is not HEALPix is brought to the map's Nside. Pixels below the mask
-    /// threshold are left out.
+    /// Mask, of any format, ordering and Nside: a coarser one counts for all pixels within its own, of a finer one the
+    /// mean counts, in which a missing value is 0. Pixels below the mask threshold are left out.
     #[arg(long, short, value_name = "FILE", help_heading = "Mask")]
     pub(crate) mask: Option<PathBuf>,
     /// Variable or column of the mask file [default: as for --variable].
@@ -46,6 +50,9 @@ pub(crate) struct Input {
     #[arg(long, value_name = "X", default_value_t = 0.9, allow_negative_numbers = true, value_parser = finite)]
     #[arg(help_heading = "Mask")]
     pub(crate) mask_threshold: f64,
+    /// Take files that name different coordinate systems (COORDSYS) together all the same, as if they were in one.
+    #[arg(long)]
+    pub(crate) ignore_coordsys: bool,
 }
 
 /// How what is not HEALPix comes to be.
@@ -103,14 +110,32 @@ impl Input {
     }
 
     /// The mask, if there is one, once it is clear that it can be read.
-    pub(crate) fn mask(&self) -> Result<Option<Mask>, Error> {
+    pub(crate) fn mask(&self, running: &Running) -> Result<Option<Mask>, Error> {
         let selection =
             Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), ..Selection::default() };
         let mask = |path: &PathBuf| {
-            formats::open(path, &selection)?;
-            Ok(Mask { path: path.clone(), selection, threshold: self.mask_threshold, map: Mutex::default() })
+            let system = formats::open(path, &selection)?.about().coordinates;
+            Ok(Mask {
+                path: path.clone(),
+                selection,
+                threshold: self.mask_threshold,
+                system: system.filter(|_| !self.ignore_coordsys),
+                running: running.clone(),
+                map: Mutex::default(),
+            })
         };
         self.mask.as_ref().map(mask).transpose()
+    }
+
+    /// Refuses maps whose units differ where thresholds are in the map's unit. Files that cannot be read are passed over,
+    /// as it is said of each by itself.
+    pub(crate) fn check_units(&self, paths: &[PathBuf], unit: ThresholdUnit) -> anyhow::Result<()> {
+        if unit == ThresholdUnit::Sigma || paths.len() < 2 {
+            return Ok(());
+        }
+        let mut together = Together::new(false, true);
+        let opened = paths.iter().filter_map(|path| Some((path, self.open(path).ok()?)));
+        opened.into_iter().try_for_each(|(path, series)| together.add(path, &series.about()))
     }
 
     /// The maps of a file.
@@ -132,6 +157,11 @@ impl Series {
         self.maps.times().len().max(1)
     }
 
+    /// What they are.
+    pub(crate) fn about(&self) -> About {
+        self.maps.about()
+    }
+
     /// What they take, where that shows before one is read.
     pub(crate) fn room(&self) -> Option<Room> {
         self.maps.room()
@@ -139,6 +169,9 @@ impl Series {
 
     /// One of them, masked.
     pub(crate) fn read(&mut self, step: usize, mask: Option<&Mask>) -> Result<Map, Error> {
+        if let Some(mask) = mask {
+            mask.check(&self.maps.about()).map_err(|problem| of(&self.path, problem))?;
+        }
         let mut map = self.maps.read(step).map_err(|problem| of(&self.path, problem))?;
         if let Some(mask) = mask {
             mask.apply(&mut map).map_err(|problem| of(&self.path, problem))?;
@@ -160,11 +193,23 @@ pub(crate) struct Mask {
     path: PathBuf,
     selection: Selection,
     threshold: f64,
+    /// The coordinate system that it names, if that matters.
+    system: Option<CoordinateSystem>,
+    running: Running,
     /// It, on the grid of the last map.
     map: Mutex<Option<Arc<Map>>>,
 }
 
 impl Mask {
+    /// Refuses a map in other coordinates.
+    pub(crate) fn check(&self, about: &About) -> Result<(), Error> {
+        let mask = format!("the mask {}", shown(&self.path));
+        match of_coordinates(("the map", about.coordinates), (&mask, self.system)) {
+            Some(reason) => Err(Error::NoResult { reason }),
+            None => Ok(()),
+        }
+    }
+
     /// Masks a map.
     fn apply(&self, map: &mut Map) -> Result<(), Error> {
         let mask = self.on(map.grid())?;
@@ -176,10 +221,28 @@ impl Mask {
         let mut last = self.map.lock().unwrap_or_else(PoisonError::into_inner);
         let mask = match last.take().filter(|mask| mask.grid() == grid) {
             Some(mask) => mask,
-            None => Arc::new(self.read(grid.nside())?),
+            None => Arc::new(self.brought_to(grid)?),
         };
         *last = Some(mask.clone());
         Ok(mask)
+    }
+
+    /// It on a grid, read anew; says so where it is not the mask's own.
+    fn brought_to(&self, grid: Healpix) -> Result<Map, Error> {
+        let mask = self.read(grid.nside())?;
+        let (own, nside) = (mask.grid().nside(), grid.nside());
+        if own == nside {
+            return Ok(mask);
+        }
+        let how = match own < nside {
+            true => "each pixel of the map takes the mask's value at its centre",
+            false => "each pixel of the map takes the mean of the mask's pixels in it",
+        };
+        self.running.warn_once(
+            Topic::MaskNside,
+            format_args!("{}: the mask has Nside {own} and the map Nside {nside}, so {how}", shown(&self.path)),
+        );
+        mask.as_mask_on(grid)
     }
 
     /// The mask at an Nside; at its own where it cannot be brought there.

@@ -77,7 +77,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let measures = arguments.mapping.measures("map")?;
     let tasks = arguments.tasks()?;
-    let mapper = arguments.mapping.mapper(measures, arguments.jobs.memory())?;
+    let mapping = &arguments.mapping;
+    mapping.input().check_units(&arguments.inputs, mapping.analysis().threshold_unit)?;
+    let mapper = mapping.mapper(measures, arguments.jobs.memory(), &arguments.running, arguments.inputs.len() > 1)?;
     let progress = match &tasks[..] {
         [(input, _)] => Progress::new(shown(input), arguments.running.quiet),
         tasks => Progress::of_parts(tasks.len(), arguments.running.quiet),
@@ -221,11 +223,11 @@ impl Arguments {
             made => Some(made?),
         };
         drop(part);
+        if let Some(warning) = made.as_ref().and_then(|made| made.warning.as_ref()) {
+            self.running.warn(warning);
+        }
         progress.aside(|| {
-            let Some(Made { summary, mut ways, warning }) = made else { return meanwhile() };
-            if let Some(warning) = warning {
-                self.running.warn(warning);
-            }
+            let Some(Made { summary, mut ways, .. }) = made else { return meanwhile() };
             if !self.verbose {
                 ways.clear();
             }

@@ -10,18 +10,18 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 use longan::formats::{Error, Healpix, Map, Room};
-use longan::measures::{Catalogue, CatalogueError, Measure, split};
+use longan::measures::{self, Catalogue, CatalogueError, Measure, split};
 use longan::statistics::{Statistics, statistics};
 use longan::window::{Summation, Ways};
 use longan::{Analysis, AnalysisError, MinkowskiMaps};
 
 use super::input::{self, Input, Mask};
 use super::jobs::Memory;
-use super::misused;
-use super::options::{BodyOptions, WeightOption, between, check_memory, decimals, is_same_file, nside, shown};
+use super::options::{BodyOptions, Running, WeightOption, between, check_memory, decimals, is_same_file, nside, shown};
 use super::output::Provenance;
 use super::plugin::Plugins;
 use super::sink::{self, Kind, LayoutOptions};
+use super::{mismatch, misused};
 
 /// What of a file is measured, how, and in which layout the result is written.
 #[derive(Args, Clone, Debug, PartialEq)]
@@ -76,15 +76,23 @@ const COLUMNS_MAX: usize = 999;
 
 impl Mapping {
     /// What maps files, once it is clear that the mask can be read.
-    pub(crate) fn mapper(&self, measures: Vec<Arc<dyn Measure>>, memory: Memory) -> anyhow::Result<Mapper<'_>> {
-        Ok(Mapper { mapping: self, measures, mask: self.input.mask()?, analysis: self.analysis(), memory })
+    pub(crate) fn mapper<'a>(
+        &'a self,
+        measures: Vec<Arc<dyn Measure>>,
+        memory: Memory,
+        running: &'a Running,
+        several: bool,
+    ) -> anyhow::Result<Mapper<'a>> {
+        let (mask, analysis) = (self.input.mask(running)?, self.analysis());
+        Ok(Mapper { mapping: self, measures, mask, analysis, memory, running, several })
     }
 
     /// Whether these options ask for the same as others, in whatever way they are given.
     pub(crate) fn is_same(&self, other: &Mapping) -> bool {
         let [one, other] = [self, other].map(|mapping| {
-            let mut mapping = mapping.clone();
-            mapping.measure = mapping.measure.iter().flat_map(|list| split(list)).map(str::to_owned).collect();
+            let mut mapping = mapping.plain();
+            let usual = |text: &str| if text.contains('=') { text.to_owned() } else { measures::usual(text) };
+            mapping.measure = mapping.measure.iter().flat_map(|list| split(list)).map(usual).collect();
             if mapping.measure.is_empty() {
                 mapping.measure.push(DEFAULT.to_owned());
             }
@@ -96,6 +104,13 @@ impl Mapping {
             these.len() == those.len() && std::iter::zip(these, those).all(|(this, that)| is_same_file(this, that))
         };
         one.0 == other.0 && same(&one.1, &other.1) && same(&one.2, &other.2)
+    }
+
+    /// These options without those that make no difference to what is made, but to what is refused.
+    pub(crate) fn plain(&self) -> Self {
+        let mut plain = self.clone();
+        plain.input.ignore_coordsys = false;
+        plain
     }
 
     /// The measures asked for, as they were.
@@ -143,7 +158,7 @@ impl Mapping {
     }
 
     /// The analysis.
-    fn analysis(&self) -> Analysis {
+    pub(crate) fn analysis(&self) -> Analysis {
         Analysis {
             windows: self.window.clone(),
             weight: self.weight.weight(),
@@ -175,6 +190,9 @@ pub(crate) struct Mapper<'a> {
     mask: Option<Mask>,
     analysis: Analysis,
     memory: Memory,
+    running: &'a Running,
+    /// Whether several files are mapped.
+    several: bool,
 }
 
 /// What is made of one file.
@@ -197,7 +215,7 @@ impl Mapper<'_> {
         command: &str,
         progress: impl Fn(f64),
     ) -> anyhow::Result<Made> {
-        let Mapper { mapping, measures, mask, analysis, memory } = self;
+        let Mapper { mapping, measures, mask, analysis, memory, running, several } = self;
         let mut series = mapping.input.open(path)?;
         let _taken = memory.take(series.room().and_then(|room| self.bytes(room))).with_context(|| shown(path))?;
         let start = Instant::now();
@@ -218,6 +236,7 @@ impl Mapper<'_> {
                 Some(map) => map,
                 None => series.read(step, mask.as_ref())?,
             };
+            mismatch::warn(running, path, &map, analysis, *several || steps > 1);
             let told = |share| progress((step as f64 + share) / steps as f64);
             let maps = match mapping.sequence {
                 true => analysis.sequence(&map, measures, told),

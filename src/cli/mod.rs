@@ -14,6 +14,7 @@ mod jobs;
 mod map;
 mod mapping;
 mod measures;
+mod mismatch;
 mod options;
 mod output;
 mod plot;

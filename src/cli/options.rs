@@ -1,14 +1,18 @@
 //! Options that several commands share, and how their values are read.
 
+use std::collections::HashSet;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use longan::formats::Healpix;
 use longan::{Analysis, Body, ThresholdUnit, Thresholds, Weight};
+
+use super::progress::beside;
 
 /// Thresholds and the body that they cut out.
 #[derive(Args, Clone, Debug, PartialEq)]
@@ -96,6 +100,20 @@ pub(crate) struct Running {
     /// Print nothing but errors.
     #[arg(long, short)]
     pub(crate) quiet: bool,
+    /// What has been warned of.
+    #[arg(skip)]
+    warned: Arc<Mutex<HashSet<Topic>>>,
+}
+
+/// What many maps of one run may be warned of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Topic {
+    /// A map of Stokes Q or U.
+    Stokes,
+    /// Thresholds that hardly suit the map.
+    Thresholds,
+    /// A mask of another Nside than the map.
+    MaskNside,
 }
 
 impl Running {
@@ -113,11 +131,19 @@ impl Running {
         if self.quiet { Ok(()) } else { print(&format!("{line}\n")) }
     }
 
-    /// Prints a line to standard error, unless nothing is to be printed.
+    /// Prints a warning to standard error, unless nothing is to be printed. All warnings come this way, and no warning
+    /// from within [`Progress::aside`](super::progress::Progress::aside).
     pub(crate) fn warn(&self, line: impl Display) {
         if !self.quiet {
             // There is no other place to complain to.
-            let _ = writeln!(io::stderr(), "longan: {line}");
+            let _ = beside(|| writeln!(io::stderr(), "warning: {line}"));
+        }
+    }
+
+    /// The same, but once in a run for each topic.
+    pub(crate) fn warn_once(&self, topic: Topic, line: impl Display) {
+        if self.warned.lock().unwrap_or_else(PoisonError::into_inner).insert(topic) {
+            self.warn(line);
         }
     }
 }

@@ -20,6 +20,7 @@ use longan::{Body, Thresholds};
 
 use super::drawn::{Form, save};
 use super::input::{Input, Mask, field, place};
+use super::mismatch::of_coordinates;
 use super::misused;
 use super::options::{Running, finite, shown};
 
@@ -151,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let no_form = || format!("{}: the name does not say which picture to write; end it in .png or .svg", shown(output));
     let form = Form::of(output).with_context(no_form)?;
     formats::check_writable(output, arguments.overwrite)?;
-    let mask = arguments.input.mask()?;
+    let mask = arguments.input.mask(running)?;
     let map = arguments.read(&arguments.input, path, mask.as_ref())?;
     if map.values().iter().all(|v| v.is_nan()) {
         running.warn(format_args!("{}: every pixel is masked, so the picture is grey", shown(path)));
@@ -241,7 +242,13 @@ impl Arguments {
         let Some(path) = &self.contour else { return Ok(of(map)) };
         let selection =
             Selection { field: self.contour_variable.clone(), at: self.contour_select.clone(), ..Selection::default() };
-        Ok(of(&formats::read(path, &selection)?))
+        let other = formats::read(path, &selection)?;
+        let system = map.coordinates.filter(|_| !self.input.ignore_coordsys);
+        let of_contours = format!("the map of contours {}", shown(path));
+        if let Some(mismatch) = of_coordinates(("the map", system), (&of_contours, other.coordinates)) {
+            bail!("{}: {mismatch}", shown(&self.input_file));
+        }
+        Ok(of(&other))
     }
 
     /// The directions asked for.

@@ -2,12 +2,16 @@
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressStyle, WeakProgressBar};
 
 /// Steps that the bar distinguishes in each part.
 const STEPS: f64 = 1000.0;
+
+/// The bar that was begun last, so that whoever prints a line can clear it meanwhile.
+static LAST: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
 /// A bar on standard error, hidden where that is no terminal or where `quiet`.
 pub(crate) struct Progress {
@@ -41,6 +45,7 @@ impl Progress {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(length as u64 * STEPS as u64) };
         let style = ProgressStyle::with_template("[{bar:30}] {percent:>3}% {eta:>3} left  {wide_msg}");
         let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        *LAST.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.downgrade());
         Progress { bar, parts, done: AtomicUsize::new(0), start: Instant::now() }
     }
 
@@ -58,6 +63,15 @@ impl Progress {
     /// Does something else on the terminal, such as printing a line.
     pub(crate) fn aside<R>(&self, what: impl FnOnce() -> R) -> R {
         self.bar.suspend(what)
+    }
+}
+
+/// Does something else on the terminal, whatever bar is on it; not within [`Progress::aside`].
+pub(crate) fn beside<R>(what: impl FnOnce() -> R) -> R {
+    let last = LAST.lock().unwrap_or_else(PoisonError::into_inner).as_ref().and_then(WeakProgressBar::upgrade);
+    match last {
+        Some(bar) => bar.suspend(what),
+        None => what(),
     }
 }
 

@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     formats::check_writable(output, *overwrite)?;
-    let mask = input.mask()?;
+    let mask = input.mask(running)?;
     let mut series = input.open(path)?;
     let steps = series.steps();
     let mut first = Some(series.read(0, mask.as_ref())?);

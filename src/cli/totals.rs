@@ -10,6 +10,7 @@ use longan::{AnalysisError, Map, Thresholds};
 use serde::Serialize;
 
 use super::input::Input;
+use super::mismatch;
 use super::options::{BodyOptions, Running, decimals, print, shown};
 use super::progress::Progress;
 
@@ -62,7 +63,7 @@ struct Row {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let path = &arguments.input_file;
-    let mask = arguments.input.mask()?;
+    let mask = arguments.input.mask(&arguments.running)?;
     let mut series = arguments.input.open(path)?;
     let steps = series.steps();
     let progress = Progress::new(shown(path), arguments.running.quiet);
@@ -70,7 +71,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for step in 0..steps {
         let map = series.read(step, mask.as_ref())?;
         let time = map.time.as_ref().map(|time| time.label.clone());
-        let rows = match arguments.body.analysis().totals(&map) {
+        let analysis = arguments.body.analysis();
+        mismatch::warn(&arguments.running, path, &map, &analysis, steps > 1);
+        let rows = match analysis.totals(&map) {
             // Of a step that has nothing to measure there are no rows.
             Err(e @ (AnalysisError::AllMasked | AnalysisError::Constant { .. })) if steps > 1 => {
                 arguments.running.warn(format_args!("{}: at {}: {e}", shown(path), time.unwrap_or_default()));

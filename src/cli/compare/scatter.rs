@@ -5,13 +5,13 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use anyhow::{Context, bail};
-use longan::formats::Healpix;
+use anyhow::{Context, bail, ensure};
+use longan::formats::{Healpix, is_alike};
 use longan::picture::cloud::{Cloud, Quantity};
 
 use super::super::drawn::{Form, save};
 use super::super::options::{between, shown};
-use super::said::Column;
+use super::said::{Column, Said};
 
 /// A point of the sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,20 +61,91 @@ impl Scatter {
 
     /// The places of its measures among the columns compared.
     pub(super) fn pair(&self, columns: &[Column]) -> anyhow::Result<[usize; 2]> {
+        let listed = |places: &mut dyn Iterator<Item = usize>| {
+            places.map(|place| columns[place].name.as_str()).collect::<Vec<_>>().join(", ")
+        };
         let mut pair = [0; 2];
         for (place, name) in pair.iter_mut().zip(&self.names) {
-            let Some(found) = columns.iter().position(|column| column.is_called(name)) else {
-                let columns: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-                bail!("--scatter: the measure '{name}' is not compared; there are {}", columns.join(", "));
+            let whole = columns.iter().position(|column| is_alike(&column.name, name));
+            let called: Vec<usize> = (0..columns.len()).filter(|&i| columns[i].is_called(name)).collect();
+            *place = match (whole, &called[..]) {
+                (Some(whole), _) => whole,
+                (None, [only]) => *only,
+                (None, []) => {
+                    let columns = listed(&mut (0..columns.len()));
+                    bail!("--scatter: the measure '{name}' is not compared; there are {columns}")
+                }
+                (None, several) => {
+                    let columns = listed(&mut several.iter().copied());
+                    bail!("--scatter: the measure '{name}' could be any of {columns}; name one of them")
+                }
             };
-            *place = found;
         }
         Ok(pair)
     }
 
+    /// Refuses measures that are not among these, whatever their windows and thresholds.
+    pub(super) fn check_among(&self, measures: &[Column]) -> anyhow::Result<()> {
+        let plain = |name: &str| Column::to_be(name.to_ascii_uppercase().replace('-', "_"), "");
+        for name in &self.names {
+            if !measures.iter().any(|measure| plain(name).is_called(&measure.name)) {
+                let measures: Vec<&str> = measures.iter().map(|measure| measure.name.as_str()).collect();
+                bail!("--scatter: the measure '{name}' is not compared; there are {}", measures.join(", "));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses data that is masked at its place. Smoothing leaves masked pixels as they are.
+    pub(super) fn check(&self, data: &Said) -> anyhow::Result<()> {
+        let pair = self.pair(&data.columns)?.map(|i| &data.columns[i]);
+        let maps = [data.read(pair[0])?.into_values(), data.read(pair[1])?.into_values()];
+        let grid = Healpix::new(data.nside)?;
+        self.check_point(&data.path, grid, self.point(grid, [&maps[0], &maps[1]]), pair)
+    }
+
+    /// Refuses the data's point where it is masked.
+    pub(super) fn check_point(
+        &self,
+        path: &Path,
+        grid: Healpix,
+        point: [f64; 2],
+        pair: [&Column; 2],
+    ) -> anyhow::Result<()> {
+        let masked = point.iter().zip(pair).find(|(value, _)| value.is_nan());
+        masked.map_or(Ok(()), |(_, column)| {
+            bail!(
+                "{}: {} is masked or undefined at {}; choose another place for --scatter",
+                shown(path),
+                column.name,
+                self.place(grid)
+            )
+        })
+    }
+
+    /// Refuses a place at which no simulation has both values.
+    pub(super) fn check_simulations(&self, grid: Healpix, points: &[[f64; 2]]) -> anyhow::Result<()> {
+        ensure!(
+            points.iter().any(|point| !point.iter().any(|value| value.is_nan())),
+            "every simulation is masked or undefined at {}; choose another place for --scatter",
+            self.place(grid)
+        );
+        Ok(())
+    }
+
+    /// Its place, for people.
+    fn place(&self, grid: Healpix) -> String {
+        format!("{},{} (pixel {} of Nside {})", self.at.lon, self.at.lat, self.pixel(grid), grid.nside())
+    }
+
+    /// The pixel (RING) that contains its point.
+    fn pixel(&self, grid: Healpix) -> usize {
+        grid.pixel_at((90.0 - self.at.lat).to_radians(), self.at.lon.to_radians())
+    }
+
     /// The values of two maps at its pixel.
     pub(super) fn point(&self, grid: Healpix, maps: [&[f64]; 2]) -> [f64; 2] {
-        let pixel = grid.pixel_at((90.0 - self.at.lat).to_radians(), self.at.lon.to_radians());
+        let pixel = self.pixel(grid);
         maps.map(|map| map.get(pixel).copied().unwrap_or(f64::NAN))
     }
 

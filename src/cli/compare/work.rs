@@ -13,7 +13,6 @@ use longan::measures::Measure;
 
 use super::super::jobs::Jobs;
 use super::super::mapping::Mapping;
-use super::super::misused;
 use super::super::options::{Running, is_same_file, shown};
 use super::super::output::command;
 use super::super::progress::Progress;
@@ -32,11 +31,7 @@ pub(super) fn minkowski_maps(
     jobs: &Jobs,
     running: &Running,
 ) -> anyhow::Result<Vec<Said>> {
-    let mapper = mapping.mapper(measures, jobs.memory())?;
-    if mapper.tables() != 1 {
-        let problem = "one window and no --sequence is compared; use `longan map`, and compare with --hdu";
-        return Err(misused("compare", problem.to_owned()));
-    }
+    let mapper = mapping.mapper(measures, jobs.memory(), running, true)?;
     let outputs = outputs(folder, inputs)?;
     for path in inputs {
         if Said::of(path, mapping.input().hdu).is_ok_and(|said| said.is_some()) {
@@ -59,7 +54,7 @@ pub(super) fn minkowski_maps(
         let made = mapper.map(input, output, true, &command(&all, input), |share| part.set(share))?;
         drop(part);
         if let Some(warning) = made.warning {
-            progress.aside(|| running.warn(warning));
+            running.warn(warning);
         }
         anyhow::Ok(())
     });
@@ -104,8 +99,9 @@ fn outputs(folder: &Path, inputs: &[&Path]) -> anyhow::Result<Vec<PathBuf>> {
 fn record(folder: &Path, mapping: &Mapping, outputs: &[PathBuf]) -> anyhow::Result<()> {
     let path = folder.join(OPTIONS);
     let options = format!(
-        "The Minkowski maps in this folder are made by longan {} with these options.\n{mapping:#?}\n",
-        env!("CARGO_PKG_VERSION")
+        "The Minkowski maps in this folder are made by longan {} with these options.\n{:#?}\n",
+        env!("CARGO_PKG_VERSION"),
+        mapping.plain()
     );
     match fs::read(&path) {
         Ok(old) => ensure!(
