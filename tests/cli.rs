@@ -24,6 +24,8 @@ mod gridded;
 mod many_maps;
 /// `longan map` on one input.
 mod map;
+/// What does not go together, and what is hardly meant.
+mod mismatch;
 /// Names that are hard to handle, the streams that the program prints to, and its help.
 mod names_and_streams;
 /// `longan plot`.

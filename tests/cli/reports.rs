@@ -224,7 +224,7 @@ fn simulated_maps() {
 
     // A field too rough for the grid.
     let ran = folder.run("simulate waves -o rough.fits --nside 4");
-    assert!(ran.code == Some(0) && ran.err.starts_with("longan: a correlation angle of 3"), "{ran:?}");
+    assert!(ran.code == Some(0) && ran.err.starts_with("warning: a correlation angle of 3"), "{ran:?}");
     assert_eq!(folder.done("simulate waves -o rough.fits --nside 4 --overwrite --quiet"), "");
 }
 

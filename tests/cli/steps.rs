@@ -25,7 +25,8 @@ fn with_series() -> Folder {
     folder
 }
 
-const WARNING: &str = "longan: series.nc: the map at 1997-12-04 is masked or constant, so the result is masked there\n";
+const WARNING: &str =
+    "warning: series.nc: the map at 1997-12-04 is masked or constant, so the result is masked there\n";
 
 /// All steps of a variable.
 pub(super) fn steps(folder: &Folder, name: &str, variable: &str) -> Vec<Map> {
@@ -120,7 +121,7 @@ fn totals_of_each_step() {
     let folder = with_series();
     let totals = |format: &str| {
         let ran = folder.run(&format!("totals series.nc --threshold-unit sigma --thresholds -1,1 --format {format}"));
-        let warning = "longan: series.nc: at 1997-12-04: every pixel of the map is masked\n";
+        let warning = "warning: series.nc: at 1997-12-04: every pixel of the map is masked\n";
         assert!(ran.code == Some(0) && ran.err == warning, "{ran:?}");
         ran.out
     };
