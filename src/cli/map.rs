@@ -76,9 +76,9 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let measures = arguments.mapping.measures("map")?;
-    let tasks = arguments.tasks()?;
     let mapping = &arguments.mapping;
     mapping.input().check_units(&arguments.inputs, mapping.analysis().threshold_unit)?;
+    let tasks = arguments.tasks()?;
     let mapper = mapping.mapper(measures, arguments.jobs.memory(), &arguments.running, arguments.inputs.len() > 1)?;
     let progress = match &tasks[..] {
         [(input, _)] => Progress::new(shown(input), arguments.running.quiet),
