@@ -23,7 +23,7 @@ use crate::{Card, CardValue, CoordinateSystem, Error, Healpix, Map, Ordering};
 /// The field of a file that is to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Field {
-    /// By its name, in any case.
+    /// By its name, in any case, and with `-` for `_`.
     Name(String),
     /// By its place among the data columns from 0, as healpy counts; a column of pixel numbers is not counted.
     /// In a sparse table (Fermi's cubes) the plane.

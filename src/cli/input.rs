@@ -18,7 +18,7 @@ use super::options::{Running, Topic, between, finite, nside, shown, whole};
 #[derive(Args, Clone, Debug, PartialEq)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct Input {
-    /// Variable or column: its name, or its number counted from 0 as healpy does [default: the first of a FITS table; of
+    /// Variable or column: its name, whatever its case and with - or _, or its number counted from 0 as healpy does [default: the first of a FITS table; of
     /// other files the only one].
     #[arg(long = "variable", visible_aliases = ["field", "column"], value_name = "NAME|NUMBER", value_parser = field)]
     pub(crate) field: Option<Field>,

@@ -27,8 +27,8 @@ use super::{mismatch, misused};
 #[derive(Args, Clone, Debug, PartialEq)]
 pub(crate) struct Mapping {
     /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
-    /// "beta = (w1 - psi2)/(w1 + psi2)"; may be repeated. `longan measures` lists all measures, and
-    /// `longan measures --help` explains formulas [default: evq].
+    /// "beta = (w1 - psi2)/(w1 + psi2)"; may be repeated. Capitals are small letters, and _ is - outside of formulas.
+    /// `longan measures` lists all measures, and `longan measures --help` explains formulas [default: evq].
     #[arg(long, value_name = "LIST")]
     measure: Vec<String>,
     #[command(flatten)]

@@ -80,6 +80,9 @@ impl Together {
 /// Warns of what may be meant but seldom is, before a map is measured; of each kind once in a run. `several` is whether
 /// the run measures other maps too.
 pub(crate) fn warn(running: &Running, path: &Path, map: &Map, analysis: &Analysis, several: bool) {
+    if running.quiet {
+        return;
+    }
     let once = if several { " (this is said of the first such map only)" } else { "" };
     if map.sphere == Sphere::Sky && is_stokes(&map.name) {
         running.warn_once(

@@ -291,7 +291,7 @@ fn fields_and_tables_are_chosen() {
     let tables = [
         bytes::primary(),
         bytes::table(3072, &[column("I_STOKES", &values), column("7", &other)], &[("NSIDE", "16")]),
-        bytes::table(3072, &[column("Q", &other)], &[("NSIDE", "16")]),
+        bytes::table(3072, &[column("B", &other)], &[("NSIDE", "16")]),
     ];
     folder.write("two.fits", &tables.concat());
     folder.write("other.fits", &map_file(&other, &[]));
@@ -306,8 +306,8 @@ fn fields_and_tables_are_chosen() {
         ("--field 1", "7", &second),
         ("--field 7", "7", &second),
         ("--hdu 1", "I_STOKES", &first),
-        ("--hdu 2", "Q", &second),
-        ("--hdu 2 --field Q", "Q", &second),
+        ("--hdu 2", "B", &second),
+        ("--hdu 2 --field b", "B", &second),
     ] {
         folder.done(&format!("map two.fits -o out.fits --overwrite {options}"));
         assert_same(&folder.read("out.fits", "EVQ"), expected);
