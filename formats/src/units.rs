@@ -12,7 +12,7 @@ pub fn differ(one: &str, other: &str) -> bool {
     let ((one, kind), (other, other_kind)) = (parts(one), parts(other));
     let open = one.is_empty() || other.is_empty();
     let same_kind = kind.is_none() || other_kind.is_none() || kind == other_kind;
-    !open && !(one == other && same_kind)
+    !(open || one == other && same_kind)
 }
 
 /// The factors of a unit in order, and the kind of its temperature where it names one.

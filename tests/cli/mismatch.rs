@@ -327,7 +327,9 @@ fn maps_of_several_times_are_refused_with_a_remedy() {
     for end in ["fits", "nc"] {
         let names = ["maps", "one", "two"].map(|name| format!("{name}.{end}"));
         folder.done(&format!("map series.nc -o {} --window 30 --nside-out 2", names[0]));
-        names[1..].iter().for_each(|copy| drop(std::fs::copy(folder.path(&names[0]), folder.path(copy)).unwrap()));
+        for copy in &names[1..] {
+            std::fs::copy(folder.path(&names[0]), folder.path(copy)).unwrap();
+        }
         let words = format!("compare {} -o out.fits", names.join(" "));
         folder.refused(&words, &[&format!("maps.{end}: there are maps for 3 "), "`longan map --select time="]);
     }
