@@ -273,7 +273,7 @@ mod tests {
         let missing = |p: usize, seen: &mut [usize]| {
             let parent = parent(fine, grid, p);
             seen[parent] += 1;
-            parent == 7 || parent == 9 && seen[parent] > 1 || ![7, 9].contains(&parent) && p % 3 == 0
+            parent == 7 || parent == 9 && seen[parent] > 1 || ![7, 9].contains(&parent) && p.is_multiple_of(3)
         };
         let mut seen = vec![0; grid.pixels()];
         let values: Vec<f64> = (0..fine.pixels()).map(|p| if missing(p, &mut seen) { f64::NAN } else { 1.0 }).collect();
