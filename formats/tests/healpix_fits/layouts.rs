@@ -211,11 +211,14 @@ fn several_columns_of_different_types() {
     assert_same(read_with(&bytes, &field("hits")).unwrap().values(), &[3.0; 48]);
     // A name of digits is found where there is no such number.
     assert_same(read_with(&bytes, &field("217")).unwrap().values(), &b);
-    // An exact match wins, and else the first.
+    // An exact match wins, and without one a name of several is none.
     assert_same(read_with(&bytes, &field("i_stokes")).unwrap().values(), &[1.0; 48]);
-    let map = read_with(&bytes, &field("I_Stokes")).unwrap();
+    let map = read_with(&bytes, &field("I_STOKES")).unwrap();
     assert_same(map.values(), &a);
     assert_eq!(map.unit.as_deref(), Some("uK"));
+    let (error, told) = problem_with(&bytes, &field("I-Stokes"));
+    assert!(matches!(error, Error::SeveralFields { hdu: 1, .. }));
+    assert!(told.contains("0 'I_STOKES', 3 'i_stokes'") && !told.contains("HITS"), "{told}");
 
     for unknown in ["Q_STOKES", "4", ""] {
         let (error, told) = problem_with(&bytes, &field(unknown));
