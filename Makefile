@@ -10,17 +10,25 @@ export PKG_CONFIG_PATH := $(if $(PKG_CONFIG_PATH),$(PKG_CONFIG_PATH):)$(CONDA_PR
 export RUSTFLAGS += $(shell [ ! -e '$(CONDA_PREFIX)/lib/pkgconfig/cfitsio.pc' ] || echo '-Clink-arg=-Wl,-rpath,$(CONDA_PREFIX)/lib')
 endif
 
-# The folder that `make demo` writes, and flags for every cargo command that resolves packages, such as --locked.
+# The folders that `make demo` writes and `make gallery` keeps its data in, what `make bench` measures, and flags for
+# every cargo command that resolves packages, such as --locked.
 DEMO = demo
+GALLERY = gallery
+NSIDE = 512
 CARGOFLAGS =
 
-.PHONY: help demo test check licences bench install clean setup
+.PHONY: help demo gallery test check licences bench install clean setup
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile
+	@awk -F':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: setup ## build longan and write its demonstration into demo/
 	cargo run --release --bin longan $(CARGOFLAGS) -- demo $(DEMO) --overwrite
+
+gallery: setup ## draw the figures of the README and the docs from data made in gallery/
+	cargo build --release --bin longan --example gallery $(CARGOFLAGS)
+	target/release/examples/gallery $(GALLERY)
+	tools/gallery target/release/longan $(GALLERY) docs/gallery
 
 # The tests come last, so that what the run ends with is their own summary.
 test: check ## run every check and test
@@ -29,7 +37,7 @@ test: check ## run every check and test
 
 # clippy and doc share one compilation of the dependencies, the tests' build is the second and last.
 check: setup licences ## check the format, the lints, the documentation and the licences
-	tools/setup lints
+	@tools/setup lints
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets $(CARGOFLAGS) -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGOFLAGS)
@@ -43,15 +51,20 @@ licences: ## check that no dependency forces a GPL licence on longan
 		NF && (!free || $$1 ~ /GPL.* AND | AND .*GPL/) { print "licence refused: " $$2 " has \"" $$1 "\""; bad = 1 } \
 		END { exit bad }'
 
-bench: setup ## compare longan's speed with that of its peers
-	cargo bench --bench peers $(CARGOFLAGS)
+bench: setup ## compare longan's speed with that of its peers (NSIDE=512), plugins with built-ins, many maps with one
+	cargo build --release --workspace $(CARGOFLAGS)
+	python=$$(tools/setup python) && "$${python:-python3}" benches/peers.py $(NSIDE)
+	python3 benches/plugins.py
+	python3 benches/ensemble.py
+	@if command -v cdo >/dev/null && command -v nccopy >/dev/null; then python3 benches/regrid.py; \
+	else echo "bench: no cdo or nccopy, so regridding is not compared with it" >&2; fi
 
 install: setup ## install longan with cargo
 	cargo install --path . --locked
 
 clean: ## remove what was built
 	cargo clean
-	rm -rf $(DEMO)
+	rm -rf $(DEMO) $(GALLERY)
 
 setup:
 	@tools/setup

@@ -6,13 +6,15 @@
 //!
 //! Everything follows from RING order in closed form, for any Nside and without neighbour tables. A ring repeats
 //! itself: `sectors` times the same cells, turned about the pole (four times in the polar caps, once a pixel in the
-//! equatorial belt). So a [`Stencil`], the corners and the geometry of one cell in the first sector, serves all.
+//! equatorial belt). So a [`Stencil`], the corners of one cell in the first sector, and its [`Geometry`] serve all.
 //! What is done with cells is left to [`crate::contour`].
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, dvec3};
-use longan_formats::Healpix;
+use glam::DVec3;
+use longan_formats::{Healpix, Ring};
+
+use crate::angles;
 
 /// A corner of a stencil: the pixel `column` of `ring` in the first sector; `per_sector` pixels further in each next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,17 +54,39 @@ impl Stencil {
 
     /// The corners of the copy in this sector, counter-clockwise seen from outside; only the first
     /// [`count`](Self::count) are meant.
-    #[inline]
+    #[inline(always)]
     pub fn pixels(&self, sector: usize) -> [Pixel; 4] {
-        self.corners.map(|c| {
-            let mut column = c.column + sector * c.per_sector;
-            if column >= c.len {
-                column -= c.len;
-            }
-            Pixel { ring: c.ring, column, index: c.start + column }
-        })
+        self.corners.map(|corner| corner.pixel(sector))
     }
 }
+
+impl Corner {
+    #[inline(always)]
+    fn pixel(&self, sector: usize) -> Pixel {
+        let mut column = self.column + sector * self.per_sector;
+        if column >= self.len {
+            column -= self.len;
+        }
+        Pixel { ring: self.ring, column, index: self.start + column }
+    }
+
+    /// The pixel to the west, which may lie in the sector before.
+    fn west(self) -> Self {
+        Corner { column: (self.column + self.len - 1) % self.len, ..self }
+    }
+}
+
+/// A pixel ring near a cell ring.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    number: usize,
+    ring: Ring,
+    per_sector: usize,
+}
+
+const NORTH: usize = 0;
+const SAME: usize = 1;
+const SOUTH: usize = 2;
 
 /// The cells of one ring: `stencils` different ones, each repeated in `sectors` sectors.
 ///
@@ -70,8 +94,10 @@ impl Stencil {
 /// the pixels of ring i, in their order.
 #[derive(Clone, Copy, Debug)]
 pub struct CellRing {
-    grid: Healpix,
+    nside: usize,
     ring: usize,
+    /// The pixel rings to the north, of the same number, and to the south; a pole's cell has its only one three times.
+    near: [Near; 3],
     /// Number of different cells in a sector.
     pub stencils: usize,
     /// Number of sectors.
@@ -90,27 +116,31 @@ impl CellRing {
             i if i <= n => (i, 4),
             _ => (1, 4 * n),
         };
-        CellRing { grid, ring, stencils, sectors, uniform: stencils == 1 }
+        let near = [ring.saturating_sub(1), ring, ring + 1].map(|i| {
+            let number = i.clamp(1, grid.rings());
+            let ring = grid.ring(number);
+            Near { number, ring, per_sector: ring.len / sectors }
+        });
+        CellRing { nside: n, ring, near, stencils, sectors, uniform: stencils == 1 }
     }
 
     /// The `k`-th stencil of the ring, `0..self.stencils`.
     pub fn stencil(&self, k: usize) -> Stencil {
-        let (n, i) = (self.grid.nside(), self.ring);
-        let corner = |ring: usize, column: usize| {
-            let r = self.grid.ring(ring);
-            Corner { ring, column, per_sector: r.len / self.sectors, len: r.len, start: r.start }
+        let (n, i) = (self.nside, self.ring);
+        let corner = |side: usize, column: usize| {
+            let Near { number, ring, per_sector } = self.near[side];
+            Corner { ring: number, column, per_sector, len: ring.len, start: ring.start }
         };
         if i == 0 || i == 4 * n {
-            let ring = if i == 0 { 1 } else { 4 * n - 1 };
-            let column = |c: usize| if i == 0 { c } else { 3 - c };
-            return Stencil { corners: [0, 1, 2, 3].map(|c| corner(ring, column(c))), count: 4, meridian: 0.0 };
+            let columns = if i == 0 { [0, 1, 2, 3] } else { [3, 2, 1, 0] };
+            return Stencil { corners: columns.map(|c| corner(SAME, c)), count: 4, meridian: 0.0 };
         }
-        let (west, east) = (corner(i, k), corner(i, k + 1));
-        let north = |column| corner(i - 1, column);
-        let south = |column| corner(i + 1, column);
+        let (west, east) = (corner(SAME, k), corner(SAME, k + 1));
+        let north = |column| corner(NORTH, column);
+        let south = |column| corner(SOUTH, column);
         let last = k + 1 == self.stencils;
         let (corners, count) = if i > n && i < 3 * n {
-            let column = usize::from(self.grid.ring(i).shifted);
+            let column = usize::from(self.near[SAME].ring.shifted);
             ([west, south(column), east, north(column)], 4)
         } else if i < n && last {
             ([west, south(k + 1), south(k + 2), east], 4)
@@ -125,32 +155,116 @@ impl CellRing {
         } else {
             ([west, south(k), east, north(k + 1)], 4)
         };
-        let ring = self.grid.ring(i);
+        let ring = self.near[SAME].ring;
         let meridian = (2 * k + 1 + usize::from(ring.shifted)) as f64 * (PI / ring.len as f64);
         Stencil { corners, count, meridian }
+    }
+
+    /// The cells beyond the edges of a stencil's copy in this sector, each by its ring and its place there. An edge has
+    /// the number of its first corner; a triangle has no fourth.
+    pub(crate) fn beyond(&self, stencil: &Stencil, sector: usize) -> [Option<(usize, usize)>; 4] {
+        let (n, i, count) = (self.nside, self.ring, stencil.count);
+        let is_pole = i == 0 || i == 4 * n;
+        std::array::from_fn(|edge| {
+            let (from, to) = (stencil.corners[edge], stencil.corners[(edge + 1) % count]);
+            let west = stencil.corners[0];
+            // Two pixels share a side; the cells at its ends are this one and that beyond, which is here found as the
+            // one east of a pixel.
+            let east_of = match (from.ring == i, to.ring == i) {
+                _ if edge >= count => return None,
+                // About a pole, of the western of two pixels.
+                _ if is_pole => {
+                    if i == 0 {
+                        from
+                    } else {
+                        to
+                    }
+                }
+                // Of two pixels on different rings, that cell lies west or east of the one on the other ring.
+                (true, false) => {
+                    if from == west {
+                        to.west()
+                    } else {
+                        to
+                    }
+                }
+                (false, true) => {
+                    if to == west {
+                        from.west()
+                    } else {
+                        from
+                    }
+                }
+                // Both are on the next ring from the pole: the cell between them there.
+                (false, false) => {
+                    if i < n {
+                        from
+                    } else {
+                        to
+                    }
+                }
+                // Both are on this ring, at a boundary of base pixels in a cap: the cell between them nearer the pole,
+                // or the pole's.
+                (true, true) => {
+                    let (side, pole) = if i <= n { (NORTH, 0) } else { (SOUTH, 4 * n) };
+                    let Near { number, ring, per_sector } = self.near[side];
+                    if number == i {
+                        return Some((pole, 0));
+                    }
+                    Corner { ring: number, column: per_sector - 1, per_sector, len: ring.len, start: ring.start }
+                }
+            };
+            let Pixel { ring, column, .. } = east_of.pixel(sector);
+            Some((ring, column))
+        })
     }
 
     /// The geometry of a stencil, in a frame turned about the pole so that the cell's vertex lies at φ = 0.
     pub fn geometry(&self, stencil: &Stencil) -> Geometry {
         let mut geometry = Geometry { count: stencil.count, ..Geometry::default() };
         for (c, corner) in stencil.corners.iter().enumerate() {
-            let ring = self.grid.ring(corner.ring);
-            let (sin_phi, cos_phi) = (ring.phi(corner.column as isize) - stencil.meridian).sin_cos();
+            let ring = self.near[corner.ring + SAME - self.near[SAME].number].ring;
+            let (sin_phi, cos_phi) = if self.sectors == 1 {
+                // A pole's cell: its corners are the quarter turns of one another, to the last bit.
+                let half = std::f64::consts::FRAC_1_SQRT_2;
+                [(half, half), (half, -half), (-half, -half), (-half, half)][corner.column]
+            } else {
+                (ring.phi(corner.column as isize) - stencil.meridian).sin_cos()
+            };
             let (sin, cos) = (ring.sin_theta, ring.cos_theta);
-            geometry.corner[c] = dvec3(sin * cos_phi, sin * sin_phi, cos);
-            geometry.south[c] = dvec3(cos * cos_phi, cos * sin_phi, -sin);
-            geometry.east[c] = dvec3(-sin_phi, cos_phi, 0.0);
+            let at = [sin * cos_phi, sin * sin_phi, cos];
+            geometry.corner[c] = at.into();
+            for (component, value) in geometry.frames.at.iter_mut().zip(at) {
+                component[c] = value;
+            }
+            for (component, value) in geometry.frames.south.iter_mut().zip([cos * cos_phi, cos * sin_phi, -sin]) {
+                component[c] = value;
+            }
+            for (component, value) in geometry.frames.east.iter_mut().zip([-sin_phi, cos_phi]) {
+                component[c] = value;
+            }
         }
         for c in 0..stencil.count {
             let (a, b) = (geometry.corner[c], geometry.corner[(c + 1) % stencil.count]);
             let chord_sq = (b - a).length_squared();
             let cos_arc = 1.0 - chord_sq / 2.0;
             let sin_arc = (chord_sq * (1.0 - chord_sq / 4.0)).sqrt();
-            geometry.arc[c] = 2.0 * (chord_sq.sqrt() / 2.0).asin();
-            geometry.along[c] = (b - a * cos_arc) * (1.0 / sin_arc);
+            geometry.arc[c] = angles::from_sin_cos(sin_arc, cos_arc);
+            geometry.along[c] = [(b - a * cos_arc) * (1.0 / sin_arc), (b * cos_arc - a) * (1.0 / sin_arc)];
         }
         geometry
     }
+}
+
+/// The corners of a cell as unit vectors x, y, z and the tangent frames there; each component for all corners.
+#[derive(Clone, Debug, Default)]
+pub struct Frames {
+    /// Unit vectors.
+    pub at: [[f64; 4]; 3],
+    /// e_θ.
+    pub south: [[f64; 4]; 3],
+    /// e_φ; its z component is 0.
+    pub east: [[f64; 4]; 2],
 }
 
 /// Where a cell's corners lie, in a frame turned about the pole.
@@ -160,27 +274,47 @@ pub struct Geometry {
     pub count: usize,
     /// Unit vectors of the corners.
     pub corner: [DVec3; 4],
-    /// e_θ at each corner.
-    pub south: [DVec3; 4],
-    /// e_φ at each corner.
-    pub east: [DVec3; 4],
-    /// Unit tangent at each corner along the edge to the next.
-    pub along: [DVec3; 4],
+    /// The corners and their frames, component by component.
+    pub frames: Frames,
+    /// Unit tangents along each edge, from its first corner to the next: at that corner, and at the next.
+    along: [[DVec3; 2]; 4],
     /// Length of that edge in radians.
-    pub arc: [f64; 4],
+    arc: [f64; 4],
 }
 
 impl Geometry {
-    /// The point at this fraction of the edge from corner `edge` to the next.
-    #[inline]
-    pub fn point(&self, edge: usize, fraction: f64) -> DVec3 {
-        let (sin, cos) = (fraction * self.arc[edge]).sin_cos();
-        self.corner[edge] * cos + self.along[edge] * sin
+    /// The point of an edge at a fraction, at most one half, of its length from its first corner, or with `from_end`
+    /// from the next.
+    #[inline(always)]
+    pub(crate) fn point(&self, edge: usize, from_end: bool, fraction: f64) -> Point {
+        let corner = self.corner[if from_end { self.next(edge) } else { edge }];
+        let along = self.along[edge][usize::from(from_end)];
+        let (sin, versine) = angles::sin_versine(fraction * self.arc[edge]);
+        let offset = along * if from_end { -sin } else { sin } - corner * versine;
+        Point { at: corner + offset, corner, offset }
+    }
+
+    /// The corner after this one, which is also the end of this edge.
+    #[inline(always)]
+    pub(crate) fn next(&self, corner: usize) -> usize {
+        if corner + 1 == self.count { 0 } else { corner + 1 }
     }
 
     /// Unit normal of the edge's great circle, pointing into the cell.
     pub fn inward(&self, edge: usize) -> DVec3 {
-        self.corner[edge].cross(self.along[edge])
+        self.corner[edge].cross(self.along[edge][0])
+    }
+
+    /// Directions of the edge at its first corner and at the next, as (cos ϕ, sin ϕ) with ϕ counted from south towards
+    /// east. Transport along the edge takes the one to the other.
+    #[inline]
+    pub(crate) fn directions(&self, edge: usize) -> [(f64, f64); 2] {
+        let corners = [edge, self.next(edge)];
+        std::array::from_fn(|end| {
+            let (c, along, frames) = (corners[end], self.along[edge][end], &self.frames);
+            let south = along.x * frames.south[0][c] + along.y * frames.south[1][c] + along.z * frames.south[2][c];
+            (south, along.x * frames.east[0][c] + along.y * frames.east[1][c])
+        })
     }
 
     /// Area of the cell in steradian.
@@ -197,23 +331,22 @@ pub fn area_of_triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     2.0 * a.dot(b.cross(c)).atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
 }
 
-/// How many triangular cells the pixels `columns` of a ring are corners of, counted once for each such pixel.
-///
-/// A pixel's four cells give it 4 · 1/4 of a cell, or 1/12 more for each triangle among them.
-pub fn triangles(grid: Healpix, ring: usize, columns: impl Iterator<Item = usize> + Clone) -> usize {
-    let n = grid.nside();
-    let at = |remainder: usize| columns.clone().filter(|c| c % n == remainder).count();
-    let mut count = 0;
-    if ring == n || ring == 3 * n {
-        count += at(0) + at(n - 1);
+/// A point near a corner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Point {
+    /// The unit vector.
+    pub(crate) at: DVec3,
+    corner: DVec3,
+    /// From the corner to the point: what remains exact when the two nearly coincide.
+    offset: DVec3,
+}
+
+impl Point {
+    /// The vector from another point of the cell to this one, without cancellation where both are near one corner.
+    #[inline(always)]
+    pub(crate) fn minus(&self, other: &Point) -> DVec3 {
+        (self.corner - other.corner) + (self.offset - other.offset)
     }
-    if ring == n + 1 {
-        count += at(0);
-    }
-    if ring == 3 * n - 1 {
-        count += at(0);
-    }
-    count
 }
 
 #[cfg(test)]
@@ -261,6 +394,32 @@ mod tests {
     }
 
     #[test]
+    fn the_cell_beyond_an_edge_has_that_edge_too() {
+        for nside in [1, 2, 3, 4, 5, 8, 21] {
+            let grid = Healpix::new(nside).unwrap();
+            let edges_of = |(i, column): (usize, usize)| {
+                let ring = CellRing::new(grid, i);
+                let (sector, k) = (column / ring.stencils, column % ring.stencils);
+                let stencil = ring.stencil(k);
+                let n = stencil.count();
+                let pixels = stencil.pixels(sector).map(|p| p.index);
+                let beyond = ring.beyond(&stencil, sector);
+                assert_eq!(beyond.iter().flatten().count(), n);
+                (0..n).map(|e| ([pixels[e], pixels[(e + 1) % n]], beyond[e].unwrap())).collect::<Vec<_>>()
+            };
+            for i in 0..=4 * nside {
+                let cells = if i % (4 * nside) == 0 { 1 } else { grid.ring(i).len };
+                for cell in (0..cells).map(|column| (i, column)) {
+                    for ([from, to], beyond) in edges_of(cell) {
+                        let back = edges_of(beyond).into_iter().find(|(edge, _)| *edge == [to, from]);
+                        assert_eq!(back.map(|b| b.1), Some(cell), "Nside {nside}: {cell:?}, edge {from}, {to}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn corners_are_the_neighbours_that_cdshealpix_names() {
         use cdshealpix::compass_point::MainWind::{E, NE, SE};
         for depth in 0..6 {
@@ -279,21 +438,6 @@ mod tests {
                 cell.extend([NE, E, SE].iter().filter_map(|&w| neighbours.get(w)).map(|&h| layer.to_ring(h) as usize));
                 cell.sort_unstable();
                 assert!(ours.contains(&cell), "Nside {nside}: no cell {cell:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn triangles_are_counted_where_they_are() {
-        for nside in [1, 2, 3, 8] {
-            let grid = Healpix::new(nside).unwrap();
-            let mut of_pixel = vec![0; grid.pixels()];
-            all_cells(nside).iter().filter(|c| c.0.len() == 3).flat_map(|c| &c.0).for_each(|&p| of_pixel[p] += 1);
-            for i in 1..=grid.rings() {
-                let ring = grid.ring(i);
-                for j in 0..ring.len {
-                    assert_eq!(triangles(grid, i, j..j + 1), of_pixel[ring.start + j], "Nside {nside}, ring {i}, {j}");
-                }
             }
         }
     }

@@ -11,30 +11,49 @@
 //! let map = Map::new("a pixel", values)?;
 //!
 //! let analysis = Analysis {
-//!     window: 20.0,
+//!     windows: vec![20.0],
 //!     thresholds: "0.5".parse()?,
 //!     threshold_unit: longan::ThresholdUnit::Value,
 //!     ..Analysis::default()
 //! };
 //! let maps = analysis.minkowski_maps(&map, &[find("w2")?, find("evq")?], |_| ())?;
-//! let (w2, evq) = (&maps.values[0], &maps.values[1]);
+//! let (w2, evq) = (&maps[0].values[0], &maps[0].values[1]);
 //! // The contour's total curvature in a window that holds all of it: 2π less the body's area.
 //! assert!((w2[400] - std::f64::consts::TAU).abs() < 0.02);
 //! assert!(evq[400] > 1.0 && evq[0].is_nan());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The way of a field: [`formats`](longan_formats) → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
-//! pixels, by [`transport`] → moments of [`window`]s, or [`totals`] → [`measures`](longan_measures) → output.
+//! A field of any file that longan reads, whatever its grid, comes from [`formats::read`]:
+//!
+//! ```no_run
+//! use longan::formats::{self, At, Place, Selection};
+//!
+//! let level = At { dimension: "level".to_owned(), place: Place::Value("500".to_owned()) };
+//! let map = formats::read("era5.nc".as_ref(), &Selection { at: vec![level], nside: Some(64), ..Selection::default() })?;
+//! # Ok::<(), formats::Error>(())
+//! ```
+//!
+//! Where it has several times, [`formats::open`] gives one map after the other.
+//!
+//! The way of a field: [`formats`] → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
+//! pixels, by [`transport`] → moments of [`window`]s, or [`totals`] → [`measures`] → output.
 //! [`Analysis`] brings these together. No module here prints or knows a path.
 //!
 //! Angles are in degrees in [`Analysis`], [`simulate`] and the measures, in radians below; lengths and areas on the
 //! unit sphere, in radians and steradian.
 
 mod analysis;
+mod angles;
 pub mod cells;
+pub mod compare;
 pub mod contour;
+pub mod gaussian;
 pub mod moments;
+pub mod picture;
+pub mod region;
+pub mod simulate;
+pub mod smoothing;
 pub mod statistics;
 pub mod thresholds;
 pub mod totals;
@@ -47,4 +66,5 @@ pub use longan_formats as formats;
 pub use longan_formats::{Healpix, Map};
 pub use longan_measures as measures;
 pub use moments::Weight;
+pub use region::Region;
 pub use thresholds::Thresholds;

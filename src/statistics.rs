@@ -22,19 +22,35 @@ pub struct Statistics {
 
 /// Statistics of the values that are not NaN; `None` if there is none.
 pub fn statistics(values: &[f64]) -> Option<Statistics> {
-    let pieces = |f: &(dyn Fn(&mut dyn Iterator<Item = f64>) -> f64 + Sync)| -> Vec<f64> {
-        values.par_chunks(PIECE).map(|piece| f(&mut piece.iter().copied().filter(|v| !v.is_nan()))).collect()
-    };
-    let sum = |f: &(dyn Fn(f64) -> f64 + Sync)| pieces(&|piece| piece.map(f).sum()).iter().sum::<f64>();
-    let unmasked = sum(&|_| 1.0);
-    let mean = sum(&|v| v / unmasked);
-    (unmasked > 0.0).then(|| Statistics {
-        unmasked: unmasked as usize,
-        min: pieces(&|piece| piece.fold(f64::INFINITY, f64::min)).into_iter().fold(f64::INFINITY, f64::min),
-        max: pieces(&|piece| piece.fold(f64::NEG_INFINITY, f64::max)).into_iter().fold(f64::NEG_INFINITY, f64::max),
-        mean,
-        sigma: (sum(&|v| (v - mean) * (v - mean)) / unmasked).sqrt(),
+    let pieces: Vec<Statistics> = values.par_chunks(PIECE).filter_map(of_piece).collect();
+    let unmasked: usize = pieces.iter().map(|p| p.unmasked).sum();
+    let share = |p: &Statistics| p.unmasked as f64 / unmasked as f64;
+    let mean: f64 = pieces.iter().map(|p| share(p) * p.mean).sum();
+    // Within the pieces, and between them.
+    let variance: f64 = pieces.iter().map(|p| share(p) * (p.sigma.powi(2) + (p.mean - mean).powi(2))).sum();
+    pieces.iter().copied().reduce(|a, b| Statistics { min: a.min.min(b.min), max: a.max.max(b.max), ..a }).map(|all| {
+        // A constant field keeps its value and has no scatter, whatever the rounding.
+        let constant = all.min == all.max;
+        Statistics {
+            unmasked,
+            mean: if constant { all.min } else { mean },
+            sigma: if constant { 0.0 } else { variance.sqrt() },
+            ..all
+        }
     })
+}
+
+fn of_piece(values: &[f64]) -> Option<Statistics> {
+    let (mut unmasked, mut sum, mut min, mut max) = (0, 0.0, f64::INFINITY, f64::NEG_INFINITY);
+    for &v in values.iter().filter(|v| !v.is_nan()) {
+        unmasked += 1;
+        sum += v;
+        min = min.min(v);
+        max = max.max(v);
+    }
+    let mean = sum / unmasked as f64;
+    let squares: f64 = values.iter().filter(|v| !v.is_nan()).map(|v| (v - mean) * (v - mean)).sum();
+    (unmasked > 0).then(|| Statistics { unmasked, min, max, mean, sigma: (squares / unmasked as f64).sqrt() })
 }
 
 #[cfg(test)]
@@ -42,9 +58,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn pieces_make_the_whole() {
+        let values: Vec<f64> = (0..200_000).map(|i| f64::from(i % 1000) + 1e6).collect();
+        let s = statistics(&values).unwrap();
+        assert!((s.mean - 1_000_499.5).abs() < 1e-6);
+        assert!((s.sigma - (999_999.0f64 / 12.0).sqrt()).abs() < 1e-6);
+    }
+
+    #[test]
     fn masked_pixels_do_not_count() {
         let s = statistics(&[f64::NAN, 1.0, 3.0, f64::NAN]).unwrap();
         assert_eq!((s.unmasked, s.min, s.max, s.mean, s.sigma), (2, 1.0, 3.0, 2.0, 1.0));
         assert_eq!(statistics(&[f64::NAN]), None);
+        assert_eq!(statistics(&[0.1; 100_000]).unwrap().sigma, 0.0);
     }
 }

@@ -2,8 +2,31 @@
 
 use std::str::FromStr;
 
+use crate::statistics::Statistics;
+
 /// The largest number of thresholds in a set; bins are 16 bit wide and one value is kept for masked pixels.
 pub const THRESHOLDS_MAX: usize = u16::MAX as usize - 1;
+
+/// Several thresholds in the field's unit that together cover less than this many standard deviations are hardly meant:
+/// most often they are standard deviations.
+pub const LEAST_SPAN: f64 = 0.2;
+
+/// What makes one doubt that thresholds are meant for a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Doubt {
+    /// None of them lies within the field's values, so that there is no contour.
+    Missed {
+        /// Statistics of the field.
+        of_map: Statistics,
+    },
+    /// They cover less than [`LEAST_SPAN`].
+    Narrow {
+        /// Statistics of the field.
+        of_map: Statistics,
+        /// What they cover, in standard deviations.
+        span: f64,
+    },
+}
 
 /// Finite, distinct thresholds in ascending order, in the unit of the field.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,6 +108,21 @@ impl Thresholds {
         Self::new(self.0.iter().map(|x| mean + x * sigma).collect())
     }
 
+    /// What is doubtful about these thresholds for a field of such statistics; nothing about one that is constant, which
+    /// has no contour anyway.
+    pub fn doubt(&self, of_map: Statistics) -> Option<Doubt> {
+        let Statistics { min, max, sigma, .. } = of_map;
+        if sigma <= 0.0 || !sigma.is_finite() {
+            return None;
+        }
+        // A body has all values at or above its threshold.
+        if !self.0.iter().any(|threshold| min < *threshold && *threshold <= max) {
+            return Some(Doubt::Missed { of_map });
+        }
+        let span = (self.0[self.0.len() - 1] - self.0[0]) / sigma;
+        (self.0.len() > 1 && span < LEAST_SPAN).then_some(Doubt::Narrow { of_map, span })
+    }
+
     /// The values, ascending.
     pub fn values(&self) -> &[f64] {
         &self.0
@@ -148,6 +186,23 @@ mod tests {
         let log = set("log:1e-2:100:5").unwrap();
         for (a, b) in log.iter().zip([0.01, 0.1, 1.0, 10.0, 100.0]) {
             assert!((a / b - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn thresholds_that_are_hardly_meant_are_doubted() {
+        let of_map = Statistics { unmasked: 9, min: -300.0, max: 280.0, mean: 0.0, sigma: 70.0 };
+        let doubt = |text: &str, of_map| text.parse::<Thresholds>().unwrap().doubt(of_map);
+        assert!(
+            matches!(doubt("-3:3:13", of_map), Some(Doubt::Narrow { span, .. }) if (span - 6.0 / 70.0).abs() < 1e-12)
+        );
+        assert_eq!(doubt("-300,300", of_map), Some(Doubt::Missed { of_map }));
+        assert_eq!(doubt("281", of_map), Some(Doubt::Missed { of_map }));
+        for meant in ["0", "280", "-7.1,7.1", "-1000,0"] {
+            assert_eq!(doubt(meant, of_map), None, "{meant}");
+        }
+        for sigma in [0.0, f64::INFINITY, f64::NAN] {
+            assert_eq!(doubt("-3:3:13", Statistics { sigma, ..of_map }), None);
         }
     }
 

@@ -24,15 +24,19 @@ pub struct RingTransport {
 impl RingTransport {
     /// From the ring of colatitude θ_x to a point of colatitude θ_w, each given as (sin θ, cos θ).
     pub fn new((sin_x, cos_x): (f64, f64), (sin_w, cos_w): (f64, f64)) -> Self {
-        RingTransport {
-            sines: sin_x * sin_w,
-            one_plus_cosines: 1.0 + cos_x * cos_w,
-            sum_of_cosines: cos_x + cos_w,
-        }
+        RingTransport { sines: sin_x * sin_w, one_plus_cosines: 1.0 + cos_x * cos_w, sum_of_cosines: cos_x + cos_w }
+    }
+
+    /// dδ/dΔφ.
+    pub fn rate(&self, dphi: f64) -> f64 {
+        // δ = 2 atan(t tan(Δφ/2)) with t its rate at 0.
+        let t = self.sum_of_cosines / (self.one_plus_cosines + self.sines);
+        let (sin, cos) = (dphi / 2.0).sin_cos();
+        t / (cos * cos + t * t * sin * sin)
     }
 
     /// e^{iδ} for a difference Δφ = φ_x − φ_w of longitude; 1 at the antipode, where no geodesic is singled out.
-    #[inline]
+    #[inline(always)]
     pub fn phase(&self, cos_dphi: f64, sin_dphi: f64) -> Complex64 {
         let one_plus_dot = self.one_plus_cosines + self.sines * cos_dphi;
         if one_plus_dot > ANTIPODE {
@@ -50,15 +54,17 @@ pub const ANTIPODE: f64 = 1e-15;
 
 /// The tangent vector v at x, where x is `midpoint` over its length, as e^{iϕ} at each corner of a cell after
 /// transport there. v is a unit vector at right angles to x.
-#[inline]
+#[inline(always)]
 pub fn to_corners(v: DVec3, midpoint: DVec3, length: f64, geometry: &Geometry) -> Phases<4> {
     let mut phases = Phases::default();
+    let (v, x, frames) = (v.to_array(), midpoint.to_array(), &geometry.frames);
     for c in 0..4 {
-        let (w, south, east) = (geometry.corner[c], geometry.south[c], geometry.east[c]);
+        let dot = |a: [f64; 3], b: &[[f64; 4]; 3]| a[0] * b[0][c] + a[1] * b[1][c] + a[2] * b[2][c];
+        let dot_east = |a: [f64; 3]| a[0] * frames.east[0][c] + a[1] * frames.east[1][c];
         // Both frames at w are at right angles to w, so only the part of x + w along x counts.
-        let along = v.dot(w) / (length + midpoint.dot(w));
-        phases.re[c] = v.dot(south) - along * midpoint.dot(south);
-        phases.im[c] = v.dot(east) - along * midpoint.dot(east);
+        let along = dot(v, &frames.at) / (length + dot(x, &frames.at));
+        phases.re[c] = dot(v, &frames.south) - along * dot(x, &frames.south);
+        phases.im[c] = dot_east(v) - along * dot_east(x);
     }
     phases
 }
@@ -79,8 +85,14 @@ impl<const N: usize> Default for Phases<N> {
     }
 }
 
+impl<const N: usize> From<[Complex64; N]> for Phases<N> {
+    fn from(phases: [Complex64; N]) -> Self {
+        Phases { re: phases.map(|phase| phase.re), im: phases.map(|phase| phase.im) }
+    }
+}
+
 impl<const N: usize> Phases<N> {
-    #[inline]
+    #[inline(always)]
     fn multiply(&mut self, by: &Self) {
         for k in 0..N {
             let (re, im) = (self.re[k], self.im[k]);
@@ -100,16 +112,20 @@ pub struct Powers<const N: usize> {
 
 impl<const N: usize> Powers<N> {
     /// Starts at the power 1.
-    #[inline]
+    #[inline(always)]
     pub fn new(base: Phases<N>) -> Self {
         Powers { base, power: base, rank: 1 }
     }
 
     /// The powers `rank` ≥ 1, which must not be below the last one asked for.
-    #[inline]
+    #[inline(always)]
     pub fn raise(&mut self, rank: u32) -> &Phases<N> {
         let mut missing = rank - self.rank;
         self.rank = rank;
+        if missing == 1 {
+            self.power.multiply(&self.base);
+            return &self.power;
+        }
         let mut square = self.base;
         while missing > 0 {
             if missing & 1 == 1 {
@@ -137,9 +153,13 @@ mod tests {
 
     #[test]
     fn the_phase_is_the_vector_formula() {
-        for (tx, px, tw, pw) in
-            [(0.3, 0.2, 0.5, 1.9), (1.5, 6.0, 1.6, 0.1), (3.0, 1.0, 0.4, 3.0), (0.01, 4.0, 0.02, 0.5), (1.0, 2.0, 1.0, 2.0)]
-        {
+        for (tx, px, tw, pw) in [
+            (0.3, 0.2, 0.5, 1.9),
+            (1.5, 6.0, 1.6, 0.1),
+            (3.0, 1.0, 0.4, 3.0),
+            (0.01, 4.0, 0.02, 0.5),
+            (1.0, 2.0, 1.0, 2.0),
+        ] {
             let ((x, south, _), (w, south_w, east_w)) = (frame(tx, px), frame(tw, pw));
             let moved = south - (x + w) * (south.dot(w) / (1.0 + x.dot(w)));
             let (sin, cos) = (f64::sin(px - pw), f64::cos(px - pw));

@@ -1,34 +1,57 @@
 //! Moments of moving windows: pixels within a radius of an output pixel, transported to its centre and summed.
 //!
-//! Works from north to south, holding pixel moments only for the rings that the windows of the present output rings
-//! reach. What a window's moments mean is left to whoever visits them.
+//! Works from north to south: the moments of a band of input rings are made, added to all windows that reach it, and
+//! dropped; a window is visited when all that it reaches is in. Of the output, only the rings that reach the present
+//! band hold sums. The sum over a window's pixels is taken one by one (`direct`), or ring by ring from prefix sums
+//! (`prefix`), whichever costs less. What a window's moments mean is left to whoever visits them.
+
+mod direct;
+mod prefix;
+pub(crate) mod reach;
 
 use std::collections::VecDeque;
-use std::f64::consts::{PI, TAU};
+use std::convert::Infallible;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
-use longan_formats::Healpix;
+use longan_formats::{Healpix, Ring};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::cells;
 use crate::contour::Field;
-use crate::moments::{self, Layout, RingMoments, Selection};
-use crate::transport::{Phases, Powers, RingTransport};
+use crate::moments::{self, Layout, RingMoments, SHARES, Selection, Weight};
+use prefix::Way;
+use reach::{OutputRing, Reached};
 
-/// Rings of input moments that are made at a time, at least.
+/// Rings of input moments that are made at a time, and how few they become where many rows would take more than so
+/// many bytes.
 const BAND: usize = 128;
+const BAND_LEAST: usize = 16;
+const BAND_BYTES: usize = 1 << 28;
 
-/// Pixels transported at a time.
+/// Most output rings to a group.
+const GROUP: usize = 32;
+
+/// Most input rings to a block.
 const BLOCK: usize = 32;
 
-/// Moments of one window, the mean over the thresholds; nothing is rescaled for masked pixels.
+/// Rings to a block that is not divided further.
+const SMALLEST: usize = 2;
+
+/// Most windows that are visited together.
+const BATCH: usize = 256;
+
+/// Moments of one window, the mean over the thresholds or those of one; nothing is rescaled for masked pixels.
 #[derive(Clone, Debug, Default)]
 pub struct Moments {
     /// Colatitude and longitude of the window's centre in radians.
     pub centre: (f64, f64),
+    /// Its radius in radians.
+    pub radius: f64,
     /// Share of the window's cells that are masked; 1 for a window without pixels.
     pub masked_fraction: f64,
+    /// Share of the edges of the window's pixels that lie beside a masked cell; 0 where no curvature is selected.
+    pub lost_edges: f64,
     /// W0 in steradian; 0 unless selected, as the following.
     pub area: f64,
     /// W1 in radians.
@@ -39,268 +62,471 @@ pub struct Moments {
     pub psi: Vec<Complex64>,
 }
 
-/// Visits the windows of radius `radius` (radians; 0: the input pixel itself) about all pixels of `output`.
-///
-/// `visit` fills `columns` numbers for each; they are returned column by column, in RING order. `progress` is told the
-/// share done, from 0 to 1. The result does not depend on the number of threads.
-///
-/// # Panics
-/// For radius 0 if the output grid is not the input's.
-pub fn windows(
-    field: &Field<'_>,
-    selection: &Selection,
-    output: Healpix,
-    radius: f64,
-    columns: usize,
-    visit: impl Fn(&Moments, &mut [f64]) + Sync,
-    mut progress: impl FnMut(f64),
-) -> Vec<Vec<f64>> {
-    assert!(radius > 0.0 || output == field.grid(), "a window of one pixel needs the input's grid");
-    let layout = Layout::new(selection, field.has_masked());
-    let input = field.grid();
-    let mut out = vec![Vec::with_capacity(output.pixels()); columns];
-    let mut band = Band { first: 1, rings: VecDeque::new() };
-    let mut next = 1;
-    while next <= output.rings() {
-        // As many output rings as make a band of input rings.
-        let first = next;
-        let mut reach = rings_within(input, output, first, radius);
-        let lowest = reach.end + BAND;
-        while next < output.rings() && rings_within(input, output, next + 1, radius).end <= lowest {
-            next += 1;
-            reach.end = reach.end.max(rings_within(input, output, next, radius).end);
+impl Moments {
+    /// Makes up for what is masked: every extensive quantity is divided by the unmasked share of the window, that of
+    /// cells, or for curvature, which sits on the edges, that of edges. `weight` is that of ψ_s.
+    pub(crate) fn scale_up(&mut self, weight: Weight) {
+        let (cells, edges) = (1.0 - self.masked_fraction, 1.0 - self.lost_edges);
+        self.area /= cells;
+        self.length /= cells;
+        self.curvature /= edges;
+        let share = match weight {
+            Weight::Length => cells,
+            Weight::Curvature => edges,
+        };
+        self.psi.iter_mut().for_each(|psi| *psi /= share);
+    }
+}
+
+/// How windows are summed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Summation {
+    /// Pixel by pixel.
+    Exact,
+    /// From prefix sums wherever that costs less and the phases of transport are met to this accuracy: then ψ_s is
+    /// off by at most this share of the window's sum of |weights|, which is W1 where contours weigh by length. Areas,
+    /// lengths, curvatures and masked fractions stay exact.
+    Tolerance(f64),
+    /// The same, from prefix sums wherever that is accurate enough, whatever it costs.
+    Prefix(f64),
+}
+
+/// What rounding leaves of the accuracy of sums, generously: they may have many terms.
+const ROUNDING: f64 = 1e-12;
+
+impl Summation {
+    /// The accuracy of ψ_s as a share of the sum of |weights|.
+    pub fn resolution(self) -> f64 {
+        match self {
+            Summation::Exact => ROUNDING,
+            Summation::Tolerance(tolerance) | Summation::Prefix(tolerance) => tolerance.max(ROUNDING),
         }
-        next += 1;
-        band.advance(field, &layout, reach);
-        let quadrants: Vec<Vec<f64>> = (4 * first..4 * next)
-            .into_par_iter()
-            .map(|i| {
-                let ring = OutputRing::new(input, output, i / 4, radius);
-                ring.quadrant(i % 4, &band, &layout, field.thresholds(), columns, &visit)
-            })
-            .collect();
-        for quadrant in &quadrants {
-            for (column, out) in out.iter_mut().enumerate() {
-                out.extend(quadrant.iter().skip(column).step_by(columns));
+    }
+}
+
+impl Default for Summation {
+    /// A tolerance of 10⁻⁷.
+    fn default() -> Self {
+        Summation::Tolerance(1e-7)
+    }
+}
+
+/// Which way the windows of one radius were summed, counted in pairs of an output pixel and an input ring.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ways {
+    /// Pairs summed pixel by pixel, since that costs less or is asked for.
+    pub direct: usize,
+    /// Pairs summed pixel by pixel, since no fit of the phases meets the tolerance.
+    pub missed: usize,
+    /// Pairs from prefix sums.
+    pub prefix: usize,
+    /// Largest error of a phase in those.
+    pub error: f64,
+    /// Largest number of terms to a phase.
+    pub terms: usize,
+}
+
+/// Values of all windows of one radius.
+#[derive(Clone, Debug)]
+pub struct Windows {
+    /// What was visited, column by column, in RING order; where thresholds are kept by themselves, all columns of the
+    /// first, then of the next.
+    pub columns: Vec<Vec<f64>>,
+    /// How it was summed.
+    pub ways: Ways,
+}
+
+/// Windows of several radii about all pixels of a grid, moved over one field.
+#[derive(Clone, Copy, Debug)]
+pub struct MovingWindows<'a> {
+    /// The field.
+    pub field: &'a Field<'a>,
+    /// The moments to sum.
+    pub selection: &'a Selection,
+    /// The grid of the windows' centres.
+    pub output: Healpix,
+    /// Radii in radians; 0: the input pixel itself.
+    pub radii: &'a [f64],
+    /// How windows are summed.
+    pub summation: Summation,
+}
+
+impl MovingWindows<'_> {
+    /// Visits all windows, each radius by itself; the contour is followed once for all.
+    ///
+    /// `visit` fills `columns` numbers for each window. `progress` is told the share done, from 0 to 1. The result does
+    /// not depend on the number of threads.
+    ///
+    /// # Panics
+    /// For radius 0 if the output grid is not the field's.
+    pub fn visit(
+        &self,
+        columns: usize,
+        visit: impl Fn(&Moments, &mut [f64]) + Sync,
+        progress: impl FnMut(f64),
+    ) -> Vec<Windows> {
+        let each = |batch: &mut [Moments], values: &mut [f64]| {
+            batch.iter().zip(values.chunks_exact_mut(columns)).for_each(|(moments, values)| visit(moments, values));
+            Ok::<(), Infallible>(())
+        };
+        match self.visit_batches(columns, each, progress) {
+            Ok(windows) => windows,
+            Err(never) => match never {},
+        }
+    }
+
+    /// The same, with many windows at a time: `visit` fills `columns` numbers for the first, then for the next. Where
+    /// thresholds are kept by themselves, each window comes once for each threshold.
+    ///
+    /// # Errors
+    /// The northernmost of `visit`, which ends the work.
+    ///
+    /// # Panics
+    /// As [`visit`](Self::visit).
+    pub fn visit_batches<E: Send>(
+        &self,
+        columns: usize,
+        visit: impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E> + Sync,
+        mut progress: impl FnMut(f64),
+    ) -> Result<Vec<Windows>, E> {
+        let input = self.field.grid();
+        assert!(!self.radii.contains(&0.0) || self.output == input, "a window of one pixel needs the input's grid");
+        let layout = Layout::new(self.selection, self.field.thresholds(), self.field.has_masked());
+        let mut sweeps: Vec<Sweep<'_>> =
+            self.radii.iter().map(|&radius| Sweep::new(self, &layout, radius, columns)).collect();
+        let ring_bytes = 4 * input.nside() * layout.rows.max(1) * size_of::<f64>();
+        let rings = (BAND_BYTES / ring_bytes).clamp(BAND_LEAST, BAND);
+        for first in (1..=input.rings()).step_by(rings) {
+            let band = Band::new(self.field, &layout, first..(first + rings).min(input.rings() + 1));
+            for sweep in &mut sweeps {
+                sweep.add(&band);
+                sweep.visit_finished(band.rings.end, &visit)?;
             }
+            let last = input.ring(band.rings.end - 1);
+            progress((last.start + last.len) as f64 / input.pixels() as f64);
         }
-        let done = output.ring(next - 1);
-        progress((done.start + done.len) as f64 / output.pixels() as f64);
+        Ok(sweeps.into_iter().map(|sweep| sweep.windows).collect())
     }
-    out
 }
 
-/// The input rings that windows about an output ring may reach.
-fn rings_within(input: Healpix, output: Healpix, ring: usize, radius: f64) -> Range<usize> {
-    if radius == 0.0 {
-        return ring..ring + 1;
+/// About how many bytes the sums of one radius's windows take at most: those of the output rings that an input ring, a
+/// band of them and a group's rings beside it reach.
+pub(crate) fn memory(input: Healpix, output: Healpix, radius: f64, rows: usize) -> usize {
+    let band = BAND as f64 * PI / input.rings() as f64;
+    let group = (GROUP as f64 * PI / output.rings() as f64).min(radius);
+    // The widest zone is about the equator.
+    let share = (radius + group + band / 2.0).min(FRAC_PI_2).sin();
+    (share * output.pixels() as f64 * ((rows + 1) * size_of::<f64>()) as f64) as usize
+}
+
+/// About how many bytes the moments of a band of input rings take.
+pub(crate) fn band_memory(input: Healpix, rows: usize) -> usize {
+    BAND.min(input.rings()) * 4 * input.nside() * rows * size_of::<f64>()
+}
+
+/// The windows of one radius on their way over the field.
+struct Sweep<'a> {
+    of: &'a MovingWindows<'a>,
+    layout: &'a Layout,
+    radius: f64,
+    /// Groups of output rings that have been reached but are not complete.
+    groups: VecDeque<Group>,
+    /// The next output ring to be reached.
+    next: Option<OutputRing>,
+    windows: Windows,
+}
+
+/// Neighbouring output rings, whose windows are summed together.
+struct Group {
+    rings: Vec<OutputRing>,
+    /// Input rings that may be reached.
+    reach: Range<usize>,
+    /// For each quadrant the windows of each ring.
+    quadrants: [Vec<Sums>; 4],
+    ways: Ways,
+}
+
+impl<'a> Sweep<'a> {
+    fn new(of: &'a MovingWindows<'a>, layout: &'a Layout, radius: f64, columns: usize) -> Self {
+        let columns = (0..columns * layout.groups).map(|_| Vec::with_capacity(of.output.pixels()));
+        let windows = Windows { columns: columns.collect(), ways: Ways::default() };
+        let next = Some(OutputRing::new(of.field.grid(), of.output, 1, radius));
+        Sweep { of, layout, radius, groups: VecDeque::new(), next, windows }
     }
-    let theta = output.ring(ring).theta();
-    let first_south_of = |theta: f64| {
-        let (mut north, mut south) = (1, input.rings() + 1);
-        while north < south {
-            let middle = (north + south) / 2;
-            if input.ring(middle).theta() < theta { north = middle + 1 } else { south = middle }
+
+    /// Adds a band of input rings to all windows that reach it.
+    fn add(&mut self, band: &Band) {
+        while self.next.as_ref().is_some_and(|ring| ring.reach.start < band.rings.end) {
+            let group = self.next_group();
+            self.groups.push_back(group);
         }
-        north
-    };
-    // One ring more on each side: which pixels are in the window is decided for each ring.
-    let (north, south) = (first_south_of(theta - radius), first_south_of(theta + radius));
-    north.saturating_sub(1).max(1)..(south + 1).min(input.rings() + 1)
+        let (of, layout, radius) = (self.of, self.layout, self.radius);
+        self.groups.par_iter_mut().for_each(|group| group.add(band, of, layout, radius));
+    }
+
+    /// The next output rings, no farther apart than the windows' radius: their phases differ little more than those
+    /// of one ring.
+    fn next_group(&mut self) -> Group {
+        let (input, output) = (self.of.field.grid(), self.of.output);
+        let mut rings: Vec<OutputRing> = Vec::new();
+        while let Some(ring) = self.next.take_if(|ring| {
+            rings.len() < GROUP && rings.first().is_none_or(|first| ring.theta - first.theta <= self.radius)
+        }) {
+            self.next =
+                (ring.number < output.rings()).then(|| OutputRing::new(input, output, ring.number + 1, self.radius));
+            rings.push(ring);
+        }
+        let reach = rings[0].reach.start..rings[rings.len() - 1].reach.end;
+        let sums = |_| rings.iter().map(|ring| Sums::new(ring.in_quadrant, self.layout.rows)).collect();
+        let quadrants = std::array::from_fn(sums);
+        Group { rings, reach, quadrants, ways: Ways::default() }
+    }
+
+    /// Visits the windows that reach no farther than `end`.
+    fn visit_finished<E: Send>(
+        &mut self,
+        end: usize,
+        visit: &(impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E> + Sync),
+    ) -> Result<(), E> {
+        let Windows { columns, ways } = &mut self.windows;
+        while self.groups.front().is_some_and(|group| group.reach.end <= end) {
+            let Some(group) = self.groups.pop_front() else { break };
+            let tasks = 4 * group.rings.len();
+            let values: Vec<Result<Vec<f64>, E>> = (0..tasks)
+                .into_par_iter()
+                .map(|task| {
+                    let (ring, quadrant) = (task / 4, task % 4);
+                    let sums = &group.quadrants[quadrant][ring];
+                    let thresholds = self.of.field.thresholds();
+                    visited(&group.rings[ring], quadrant, sums, self.layout, thresholds, columns.len(), visit)
+                })
+                .collect();
+            let values = values.into_iter().collect::<Result<Vec<_>, E>>()?;
+            let step = columns.len();
+            for (i, column) in columns.iter_mut().enumerate() {
+                values.iter().for_each(|values| column.extend(values.iter().skip(i).step_by(step)));
+            }
+            ways.add(group.ways);
+        }
+        Ok(())
+    }
 }
 
-/// Pixel moments of consecutive rings.
-struct Band {
-    first: usize,
-    rings: VecDeque<RingMoments>,
-}
-
-impl Band {
-    /// Drops the rings north of `reach` and adds those that are missing in the south.
-    fn advance(&mut self, field: &Field<'_>, layout: &Layout, reach: Range<usize>) {
-        while self.first < reach.start && self.rings.pop_front().is_some() {
-            self.first += 1;
+impl Group {
+    /// Adds what of a band is within reach, block of input rings by block.
+    fn add(&mut self, band: &Band, of: &MovingWindows<'_>, layout: &Layout, radius: f64) {
+        let (mut first, end) = (self.reach.start.max(band.rings.start), self.reach.end.min(band.rings.end));
+        while first < end {
+            let north = band.theta(first);
+            let past = (first..end).find(|&i| i - first == BLOCK || band.theta(i) - north > radius / 4.0);
+            let rings = first..past.unwrap_or(end);
+            first = rings.end;
+            self.add_block(band, rings, 0..self.rings.len(), of, layout, radius);
         }
-        self.first = self.first.max(reach.start);
-        let have = self.first + self.rings.len();
-        if have >= reach.end {
+    }
+
+    /// Adds a block of input rings to some of the group's output rings; in smaller blocks where that lets prefix sums
+    /// meet their tolerance.
+    fn add_block(
+        &mut self,
+        band: &Band,
+        rings: Range<usize>,
+        output: Range<usize>,
+        of: &MovingWindows<'_>,
+        layout: &Layout,
+        radius: f64,
+    ) {
+        let block = Block::new(&self.rings[output.clone()], band, rings.clone(), radius);
+        let way = if radius > 0.0 { Way::find(&block, layout, of.summation) } else { Way::Direct };
+        if matches!(way, Way::Missed) && rings.len().max(output.len()) > SMALLEST {
+            let halves = |range: &Range<usize>| {
+                let middle = range.start + range.len() / 2;
+                [range.start..middle, middle..range.end]
+            };
+            if rings.len() >= output.len() {
+                for rings in halves(&rings) {
+                    self.add_block(band, rings, output.clone(), of, layout, radius);
+                }
+            } else {
+                for output in halves(&output) {
+                    self.add_block(band, rings.clone(), output, of, layout, radius);
+                }
+            }
             return;
         }
-        let missing = reach.end - have;
-        let chunk = missing.div_ceil(2 * rayon::current_num_threads()).clamp(8, 64);
-        let made: Vec<Vec<RingMoments>> = (0..missing.div_ceil(chunk))
-            .into_par_iter()
-            .map(|i| {
-                let start = have + i * chunk;
-                moments::at_pixels(field, layout, start..(start + chunk).min(reach.end))
-            })
-            .collect();
-        self.rings.extend(made.into_iter().flatten());
-    }
-
-    fn ring(&self, i: usize) -> &RingMoments {
-        &self.rings[i - self.first]
-    }
-}
-
-/// What the windows about one output ring have in common.
-struct OutputRing {
-    output: Healpix,
-    ring: usize,
-    input: Healpix,
-    reached: Vec<Reached>,
-}
-
-/// An input ring that windows about an output ring reach.
-struct Reached {
-    ring: usize,
-    len: usize,
-    /// Twice the longitude of the first pixel, in pixels.
-    shift: usize,
-    /// Largest |Δφ| within the window, in radians; π or more for the whole ring.
-    half_width: f64,
-    transport: RingTransport,
-    /// cos and sin of k pixels' longitude, k < BLOCK.
-    steps: [Complex64; BLOCK],
-}
-
-impl OutputRing {
-    fn new(input: Healpix, output: Healpix, ring: usize, radius: f64) -> Self {
-        let centre = output.ring(ring);
-        let reached = rings_within(input, output, ring, radius).filter_map(|i| {
-            let r = input.ring(i);
-            // sin²(d/2) = sin²((θ_x − θ_w)/2) + sin θ_x sin θ_w sin²(Δφ/2), free of cancellation.
-            let beyond = (radius / 2.0).sin().powi(2) - ((r.theta() - centre.theta()) / 2.0).sin().powi(2);
-            let sin_sq = beyond / (r.sin_theta * centre.sin_theta);
-            if sin_sq < 0.0 {
-                return None;
+        self.quadrants.par_iter_mut().enumerate().for_each(|(quadrant, sums)| {
+            let sums = &mut sums[output.clone()];
+            match &way {
+                Way::Prefix(plan) => prefix::add(&block, quadrant, layout, plan, sums),
+                _ if radius == 0.0 => add_pixels(&block, quadrant, layout, sums),
+                _ => direct::add(&block, quadrant, layout, sums),
             }
-            let half_width = if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI };
-            let step = TAU / r.len as f64;
-            Some(Reached {
-                ring: i,
-                len: r.len,
-                shift: usize::from(r.shifted),
-                half_width,
-                transport: RingTransport::new((r.sin_theta, r.cos_theta), (centre.sin_theta, centre.cos_theta)),
-                steps: std::array::from_fn(|k| Complex64::cis(k as f64 * step)),
-            })
         });
-        OutputRing { output, ring, input, reached: if radius == 0.0 { Vec::new() } else { reached.collect() } }
+        let pairs = block.pairs().map(|(ring, _)| 4 * ring.in_quadrant).sum();
+        self.ways.add(match way {
+            Way::Prefix(plan) => plan.ways(&block),
+            Way::Direct => Ways { direct: pairs, ..Ways::default() },
+            Way::Missed => Ways { missed: pairs, ..Ways::default() },
+        });
     }
+}
 
-    /// Windows about the pixels of one quadrant of the ring. Longitudes are counted from the quadrant's own meridian,
-    /// so that a field turned by 90° gives the same windows to the last bit.
-    fn quadrant(
-        &self,
-        quadrant: usize,
-        band: &Band,
-        layout: &Layout,
-        thresholds: usize,
-        columns: usize,
-        visit: impl Fn(&Moments, &mut [f64]),
-    ) -> Vec<f64> {
-        let ring = self.output.ring(self.ring);
-        let in_quadrant = ring.len / 4;
-        let mut out = vec![0.0; in_quadrant * columns];
-        let mut sums = vec![0.0; layout.rows];
-        let mut moments = Moments::default();
-        for (k, out) in out.chunks_exact_mut(columns).enumerate() {
-            sums.fill(0.0);
-            let mut shares = 0;
-            let phi = ring.phi(k as isize);
-            let column = quadrant * in_quadrant + k;
-            if self.reached.is_empty() {
-                shares += self.shares(self.ring, column..column + 1);
-                for (row, sum) in sums.iter_mut().enumerate() {
-                    *sum = band.ring(self.ring).row(row)[column];
-                }
-            }
-            for reached in &self.reached {
-                for (columns, dphi) in reached.columns(phi, quadrant) {
-                    shares += self.shares(reached.ring, columns.clone());
-                    add(band.ring(reached.ring), layout, columns, dphi, reached, &mut sums);
-                }
-            }
-            moments.centre = (ring.theta(), ring.phi(column as isize));
-            moments.masked_fraction = match (shares, layout.masked) {
+/// A group's windows of one pixel each.
+fn add_pixels(block: &Block<'_>, quadrant: usize, layout: &Layout, sums: &mut [Sums]) {
+    for (ring, sums) in block.output.iter().zip(sums) {
+        if !block.rings.contains(&ring.number) {
+            continue;
+        }
+        let moments = block.band.moments(ring.number);
+        for k in 0..ring.in_quadrant {
+            let column = quadrant * ring.in_quadrant + k;
+            let sums = sums.of(k, 1);
+            (0..layout.rows).for_each(|row| sums[row] = moments.row(row)[column]);
+        }
+    }
+}
+
+impl Ways {
+    fn add(&mut self, other: Ways) {
+        self.direct += other.direct;
+        self.missed += other.missed;
+        self.prefix += other.prefix;
+        self.error = self.error.max(other.error);
+        self.terms = self.terms.max(other.terms);
+    }
+}
+
+/// What `visit` makes of the windows of a quadrant.
+fn visited<E>(
+    ring: &OutputRing,
+    quadrant: usize,
+    sums: &Sums,
+    layout: &Layout,
+    thresholds: usize,
+    columns: usize,
+    visit: impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E>,
+) -> Result<Vec<f64>, E> {
+    // `columns` are those of all groups of thresholds.
+    let (groups, columns) = (layout.groups, columns / layout.groups);
+    let mut out = vec![0.0; ring.in_quadrant * groups * columns];
+    let mut batch = vec![Moments::default(); (ring.in_quadrant * groups).min(BATCH)];
+    for (number, out) in out.chunks_mut(BATCH * columns).enumerate() {
+        let batch = &mut batch[..out.len() / columns];
+        for (i, moments) in batch.iter_mut().enumerate() {
+            let k = (number * BATCH + i) / groups;
+            let group = (number * BATCH + i) % groups;
+            let sum = |row: usize| sums.data[k * sums.rows + row];
+            let mean = |row: usize| sum(row) / (thresholds / groups) as f64;
+            let selected = |row: Option<usize>| row.map_or(0.0, |row| mean(row + group * layout.plain));
+            moments.radius = ring.radius;
+            moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
+            moments.masked_fraction = match (sums.pixels[k], layout.masked) {
                 (0, _) => 1.0,
-                (_, Some(row)) => sums[row] / shares as f64,
+                (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
                 (_, None) => 0.0,
             };
-            sums.iter_mut().for_each(|sum| *sum /= thresholds as f64);
-            let selected = |row: Option<usize>| row.map_or(0.0, |row| sums[row]);
+            moments.lost_edges = match (sums.pixels[k], layout.lost_edges) {
+                (0, _) | (_, None) => 0.0,
+                (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
+            };
             moments.area = selected(layout.area);
             moments.length = selected(layout.length);
             moments.curvature = selected(layout.curvature);
             moments.psi.clear();
-            moments.psi.extend(sums[layout.first_rank..].chunks_exact(2).map(|p| Complex64::new(p[0], p[1])));
-            visit(&moments, out);
+            let rows = layout.psi().map(|(row, _)| row).skip(group * layout.ranks.len()).take(layout.ranks.len());
+            // |ψ_s| ≤ W1, which the error of prefix sums must not break where a contour is nearly straight.
+            let most =
+                if layout.weight == Weight::Length && layout.length.is_some() { moments.length } else { f64::INFINITY };
+            let bounded = |psi: Complex64| if psi.norm() > most { psi * (most / psi.norm()) } else { psi };
+            moments.psi.extend(rows.map(|row| bounded(Complex64::new(mean(row), mean(row + 1)))));
         }
-        out
+        visit(batch, out)?;
+    }
+    Ok(out)
+}
+
+/// Sums over the windows about consecutive pixels.
+struct Sums {
+    rows: usize,
+    /// The rows of each window.
+    data: Vec<f64>,
+    /// Number of pixels in each window.
+    pixels: Vec<u64>,
+}
+
+impl Sums {
+    fn new(windows: usize, rows: usize) -> Self {
+        Sums { rows, data: vec![0.0; windows * rows], pixels: vec![0; windows] }
     }
 
-    /// Cell shares of these pixels, in twelfths of a cell.
-    fn shares(&self, ring: usize, columns: Range<usize>) -> usize {
-        12 * columns.len() + cells::triangles(self.input, ring, columns)
+    /// The rows of a window, to which this many pixels are to be added.
+    fn of(&mut self, window: usize, pixels: usize) -> &mut [f64] {
+        self.pixels[window] += pixels as u64;
+        &mut self.data[window * self.rows..(window + 1) * self.rows]
     }
 }
 
-impl Reached {
-    /// The pixels within the window about longitude `phi` (of the first quadrant), moved on by `quadrant`s: at most two
-    /// ranges of columns, each with its first pixel's Δφ.
-    fn columns(&self, phi: f64, quadrant: usize) -> impl Iterator<Item = (Range<usize>, f64)> + use<> {
-        let (len, step) = (self.len as isize, TAU / self.len as f64);
-        let first_phi = self.shift as f64 * step / 2.0;
-        let (mut from, mut to) = (0, len);
-        if self.half_width < PI {
-            from = ((phi - self.half_width - first_phi) / step).ceil() as isize;
-            to = ((phi + self.half_width - first_phi) / step).floor() as isize + 1;
-            to = to.clamp(from, from + len);
-        }
-        let at = (from + quadrant as isize * len / 4).rem_euclid(len);
-        let before_end = (to - from).min(len - at);
-        let dphi = |j: isize| (2 * j + self.shift as isize) as f64 * (step / 2.0) - phi;
-        [
-            (at as usize..(at + before_end) as usize, dphi(from)),
-            (0..(to - from - before_end) as usize, dphi(from + before_end)),
-        ]
-        .into_iter()
-        .filter(|(columns, _)| !columns.is_empty())
+/// Pixel moments of consecutive input rings.
+struct Band {
+    rings: Range<usize>,
+    /// Each ring with its colatitude and moments.
+    of: Vec<(Ring, f64, RingMoments)>,
+}
+
+impl Band {
+    fn new(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Self {
+        // Each chunk goes once more over the cells that it shares with its neighbours.
+        let chunk = rings.len().div_ceil(2 * rayon::current_num_threads()).max(8);
+        let starts: Vec<usize> = rings.clone().step_by(chunk).collect();
+        let made: Vec<Vec<RingMoments>> = starts
+            .into_par_iter()
+            .map(|start| moments::at_pixels(field, layout, start..(start + chunk).min(rings.end)))
+            .collect();
+        let geometry = rings.clone().map(|i| field.grid().ring(i));
+        let of = geometry.zip(made.into_iter().flatten()).map(|(ring, moments)| (ring, ring.theta(), moments));
+        Band { of: of.collect(), rings }
+    }
+
+    fn theta(&self, ring: usize) -> f64 {
+        self.of[ring - self.rings.start].1
+    }
+
+    fn moments(&self, ring: usize) -> &RingMoments {
+        &self.of[ring - self.rings.start].2
     }
 }
 
-/// Adds the moments of a range of pixels of a ring, transported; the first pixel lies `dphi` east of the centre.
-#[inline(never)]
-fn add(ring: &RingMoments, layout: &Layout, columns: Range<usize>, dphi: f64, reached: &Reached, sums: &mut [f64]) {
-    for (row, sum) in sums[..layout.first_rank].iter_mut().enumerate() {
-        *sum += ring.row(row)[columns.clone()].iter().sum::<f64>();
+/// Some input rings of a band as seen from a group of output rings.
+struct Block<'a> {
+    band: &'a Band,
+    rings: Range<usize>,
+    output: &'a [OutputRing],
+    /// For each input ring, for each output ring.
+    reached: Vec<Option<Reached>>,
+}
+
+impl<'a> Block<'a> {
+    fn new(output: &'a [OutputRing], band: &'a Band, rings: Range<usize>, radius: f64) -> Self {
+        let reached = rings.clone().flat_map(|i| {
+            let (ring, theta, _) = &band.of[i - band.rings.start];
+            output.iter().map(move |from| from.reached(i, ring, *theta, radius))
+        });
+        Block { reached: reached.collect(), band, rings, output }
     }
-    if layout.ranks.is_empty() {
-        return;
+
+    /// The output rings that reach an input ring, each with its place among them.
+    fn reaching(&self, ring: usize) -> impl Iterator<Item = (usize, &'a OutputRing, &Reached)> {
+        let n = self.output.len();
+        let reached = &self.reached[(ring - self.rings.start) * n..][..n];
+        self.output
+            .iter()
+            .zip(reached)
+            .enumerate()
+            .filter_map(|(i, (ring, reached))| Some((i, ring, reached.as_ref()?)))
     }
-    let step = TAU / reached.len as f64;
-    for start in columns.clone().step_by(BLOCK) {
-        let base = Complex64::cis(dphi + (start - columns.start) as f64 * step);
-        let mut phases = Phases::<BLOCK>::default();
-        for k in 0..BLOCK {
-            let dphi = base * reached.steps[k];
-            let phase = reached.transport.phase(dphi.re, dphi.im);
-            (phases.re[k], phases.im[k]) = (phase.re, phase.im);
-        }
-        let end = (start + BLOCK).min(columns.end);
-        let mut powers = Powers::new(phases);
-        for (i, &rank) in layout.ranks.iter().enumerate() {
-            let row = layout.first_rank + 2 * i;
-            let (re, im) = (&ring.row(row)[start..end], &ring.row(row + 1)[start..end]);
-            let power = powers.raise(rank);
-            let (mut sum_re, mut sum_im) = (0.0, 0.0);
-            for (((re, im), u), v) in re.iter().zip(im).zip(&power.re).zip(&power.im) {
-                sum_re += re * u - im * v;
-                sum_im += re * v + im * u;
-            }
-            sums[row] += sum_re;
-            sums[row + 1] += sum_im;
-        }
+
+    /// All pairs of an output ring and an input ring that it reaches.
+    fn pairs(&self) -> impl Iterator<Item = (&'a OutputRing, &Reached)> {
+        self.rings.clone().flat_map(|ring| self.reaching(ring).map(|(_, ring, reached)| (ring, reached)))
     }
 }

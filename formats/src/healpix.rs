@@ -6,7 +6,7 @@
 //!
 //! Rings are counted from 1 at the north to 4 Nside − 1 at the south.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::Error;
 
@@ -66,16 +66,15 @@ impl Ring {
 }
 
 impl Healpix {
+    /// The twelve base pixels.
+    pub(crate) const BASE: Healpix = Healpix { nside: 1 };
+
     /// The grid of this Nside.
     ///
     /// # Errors
     /// [`Error::Nside`] for 0 or more than [`NSIDE_MAX`].
     pub fn new(nside: usize) -> Result<Self, Error> {
-        if (1..=NSIDE_MAX).contains(&nside) {
-            Ok(Healpix { nside })
-        } else {
-            Err(Error::Nside { nside })
-        }
+        if (1..=NSIDE_MAX).contains(&nside) { Ok(Healpix { nside }) } else { Err(Error::Nside { nside }) }
     }
 
     /// The grid that has this many pixels, if there is one.
@@ -92,6 +91,11 @@ impl Healpix {
     /// Number of pixels, 12 Nside².
     pub fn pixels(self) -> usize {
         12 * self.nside * self.nside
+    }
+
+    /// The side, in radians, of a square as large as a pixel.
+    pub fn pixel_side(self) -> f64 {
+        (4.0 * PI / self.pixels() as f64).sqrt()
     }
 
     /// Number of rings, 4 Nside − 1.

@@ -13,12 +13,12 @@ pub(crate) const MASKED_FRACTION: Kind = Kind {
     evaluate: |_, w| Some(w.masked_fraction),
 };
 
-/// Contour length, not rescaled.
+/// Contour length, not made up for masked cells.
 pub(crate) const CONTOUR_LENGTH: Kind = Kind {
     pattern: "contour-length",
     rank: Some(0),
     unit: "rad",
-    definition: "length of contour behind a value: W1, not rescaled for masked cells",
+    definition: "length of contour behind a value: W1, not made up for masked cells",
     needs: |_| Needs { length: true, ..Needs::default() },
-    evaluate: |_, w| Some(w.length),
+    evaluate: |_, w| Some(w.length * (1.0 - w.masked_fraction)),
 };

@@ -10,7 +10,7 @@ pub(crate) const W0: Kind = Kind {
     unit: "sr",
     definition: "W0, area of the body in the window",
     needs: |_| Needs { area: true, ..Needs::default() },
-    evaluate: |_, w| Some(w.rescaled(w.area)),
+    evaluate: |_, w| Some(w.area),
 };
 
 /// Length.
@@ -20,7 +20,7 @@ pub(crate) const W1: Kind = Kind {
     unit: "rad",
     definition: "W1, length of the contour in the window",
     needs: |_| Needs { length: true, ..Needs::default() },
-    evaluate: |_, w| Some(w.rescaled(w.length)),
+    evaluate: |_, w| Some(w.length),
 };
 
 /// Total curvature.
@@ -30,7 +30,7 @@ pub(crate) const W2: Kind = Kind {
     unit: "rad",
     definition: "W2, total geodesic curvature of the contour in the window",
     needs: |_| Needs { curvature: true, ..Needs::default() },
-    evaluate: |_, w| Some(w.rescaled(w.curvature)),
+    evaluate: |_, w| Some(w.curvature),
 };
 
 /// Trace of the even-rank tensors.
@@ -40,5 +40,5 @@ pub(crate) const TRACE: Kind = Kind {
     unit: "rad",
     definition: "trace of the tensors of even rank, ψ_0",
     needs: |_| Needs { ranks: vec![0], ..Needs::default() },
-    evaluate: |_, w| Some(w.rescaled(w.psi0)),
+    evaluate: |_, w| Some(w.psi0),
 };

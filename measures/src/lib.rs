@@ -2,7 +2,8 @@
 //!
 //! A [`Measure`] says which moments it [needs](Measure::needs) and turns one window's moments into a number; how the
 //! moments come about is the engine's affair. The built-ins stand in [`BUILT_INS`], one file an idea, with their
-//! formulas; [`find`] makes one from its name. `ψ_s = Σ L e^{isϕ}` are the moments of Collischon et al. 2024,
+//! formulas; [`find`] makes one from its name. A [`Formula`] is a measure written as a text, [`plugin`] loads measures
+//! from libraries, and a [`Catalogue`] knows them all by name. `ψ_s = Σ L e^{isϕ}` are the moments of Collischon et al. 2024,
 //! "Morphometry on the sphere", Commun. Phys. 7.
 //!
 //! ```
@@ -16,9 +17,12 @@
 //! # Ok::<(), longan_measures::UnknownMeasure>(())
 //! ```
 
+mod catalogue;
 mod coverage;
+mod formula;
 mod functionals;
 mod irreducible;
+pub mod plugin;
 mod rank2;
 mod rank4;
 mod registry;
@@ -26,7 +30,19 @@ pub mod testing;
 
 use num_complex::Complex64;
 
-pub use registry::{BUILT_INS, BuiltIn, Kind, UnknownMeasure, find};
+pub use catalogue::{Catalogue, CatalogueError, split};
+pub use formula::{Formula, FormulaError};
+pub use registry::{BUILT_INS, BuiltIn, Kind, UnknownMeasure, find, usual};
+
+/// What the contour's pieces weigh in the moments ψ_s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Weight {
+    /// Their length: ψ_s of the tensors W_1^{0,s}.
+    #[default]
+    Length,
+    /// The exterior angles at its vertices: ψ_s = Σ ∫ e^{isϕ} dϕ of the curvature-weighted tensors W_2^{0,s}.
+    Curvature,
+}
 
 /// Which moments of a window a measure needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -37,11 +53,38 @@ pub struct Needs {
     pub length: bool,
     /// W2, the contour's total curvature.
     pub curvature: bool,
-    /// Ranks s of the moments ψ_s, 0 among them.
+    /// Ranks s of the moments ψ_s, 0 among them, ascending.
     pub ranks: Vec<u32>,
+    /// The weight of the moments ψ_s that the measure is defined for; `None`: either.
+    pub weight: Option<Weight>,
 }
 
-/// The moments of one window, the mean over the thresholds. Nothing is rescaled for masked cells.
+/// Why a measure could not be evaluated. That it is not defined for a window is no error.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the measure '{measure}' failed: {reason}")]
+pub struct MeasureError {
+    /// The measure's name.
+    pub measure: String,
+    /// What it says about it.
+    pub reason: String,
+}
+
+/// Where a measure comes from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Origin {
+    /// The program itself.
+    #[default]
+    Program,
+    /// A formula, with its text.
+    Formula(String),
+    /// A plugin, with its name, version and file.
+    Plugin(String),
+}
+
+/// The moments of one window, the mean over the thresholds.
+///
+/// Areas, lengths and ψ_s are those of the whole window: what is masked has been made up for, once, by division by
+/// 1 − `masked_fraction`, curvatures by their own share.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Window<'a> {
     /// Colatitude and longitude of the centre in degrees.
@@ -60,6 +103,8 @@ pub struct Window<'a> {
     pub ranks: &'a [u32],
     /// ψ_s of these ranks, in the frame of the centre: angles count from south towards east.
     pub psi: &'a [Complex64],
+    /// The accuracy of ψ_s, s ≥ 1, as a share of the contour's weight: what differs by less is not told apart.
+    pub resolution: f64,
 }
 
 impl Window<'_> {
@@ -72,11 +117,6 @@ impl Window<'_> {
             0 => self.psi0.into(),
             _ => self.psi[self.ranks.binary_search(&rank).expect("a rank that the measure needs")],
         }
-    }
-
-    /// An extensive quantity, scaled up from the unmasked part of the window to the whole.
-    pub fn rescaled(&self, value: f64) -> f64 {
-        value / (1.0 - self.masked_fraction)
     }
 }
 
@@ -100,8 +140,30 @@ pub trait Measure: Send + Sync {
     /// The measure of one window, in its [unit](Self::unit); `None` where it is not defined.
     fn evaluate(&self, window: &Window<'_>) -> Option<f64>;
 
+    /// The measure of many windows, each as [`evaluate`](Self::evaluate) has it; NaN where it is not defined.
+    ///
+    /// # Errors
+    /// Where the measure itself fails, as one from a plugin may.
+    fn evaluate_all(&self, windows: &[Window<'_>], values: &mut [f64]) -> Result<(), MeasureError> {
+        for (value, window) in values.iter_mut().zip(windows) {
+            *value = self.evaluate(window).unwrap_or(f64::NAN);
+        }
+        Ok(())
+    }
+
+    /// Whether it is a ratio or a direction, which a window with hardly any contour gives at random, and not a quantity
+    /// that adds up. By default what has no unit or degrees is, but for what needs no moments.
+    fn is_relative(&self) -> bool {
+        matches!(self.unit(), "" | "deg") && self.needs() != Needs::default()
+    }
+
     /// The name of its column in a file: `EVQ_DIRECTION`.
     fn column(&self) -> String {
-        self.name().to_uppercase().replace('-', "_")
+        self.name().to_uppercase().replace(['-', ':'], "_")
+    }
+
+    /// Where it comes from.
+    fn origin(&self) -> Origin {
+        Origin::Program
     }
 }

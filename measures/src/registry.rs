@@ -28,6 +28,7 @@ pub const BUILT_INS: &[&Kind] = &[
     &functionals::W2,
     &functionals::TRACE,
     &rank2::EVQ,
+    &rank2::BETA,
     &rank2::EVQ_DIRECTION,
     &irreducible::PSI,
     &irreducible::PSI_DIRECTION,
@@ -100,22 +101,40 @@ pub struct UnknownMeasure {
     pub nearest: Option<String>,
 }
 
-/// The built-in measure of this name.
-///
-/// # Errors
-/// [`UnknownMeasure`], with the nearest name.
-pub fn find(name: &str) -> Result<BuiltIn, UnknownMeasure> {
-    BUILT_INS.iter().find_map(|&kind| named(kind, name)).ok_or_else(|| {
-        let rank: String = name.chars().filter(char::is_ascii_digit).collect();
-        let nearest = BUILT_INS
-            .iter()
-            .map(|kind| kind.pattern.replace('N', if rank.is_empty() { "2" } else { &rank }))
-            .map(|known| (strsim::damerau_levenshtein(&known, name), known))
+impl UnknownMeasure {
+    /// A name that is none of the known ones.
+    pub(crate) fn new(name: &str, known: impl Iterator<Item = String>) -> Self {
+        let usual = usual(name);
+        let nearest = known
+            .map(|known| (strsim::damerau_levenshtein(&known, &usual), known))
             .min()
             .filter(|(distance, known)| 2 * distance <= known.len())
             .map(|(_, known)| known);
         UnknownMeasure { name: name.to_owned(), nearest }
-    })
+    }
+}
+
+/// A name as measures have it, in small letters and with hyphens, however it is typed: `EVQ` is `evq`,
+/// `Psi2_Direction` is `psi2-direction`.
+pub fn usual(name: &str) -> String {
+    name.trim().to_lowercase().replace('_', "-")
+}
+
+/// The built-in measure of this [`usual`] name.
+///
+/// # Errors
+/// [`UnknownMeasure`], with the nearest name.
+pub fn find(name: &str) -> Result<BuiltIn, UnknownMeasure> {
+    let usual = usual(name);
+    let found = BUILT_INS.iter().find_map(|&kind| named(kind, &usual));
+    found.ok_or_else(|| UnknownMeasure::new(name, names_like(name)))
+}
+
+/// The names of the built-ins, families with the rank that `name` has.
+pub(crate) fn names_like(name: &str) -> impl Iterator<Item = String> {
+    let digits: String = name.chars().filter(char::is_ascii_digit).collect();
+    let rank = digits.parse().ok().filter(|&rank: &u32| rank > 0).unwrap_or(2);
+    BUILT_INS.iter().map(move |kind| BuiltIn::new(kind, rank).name())
 }
 
 fn named(kind: &'static Kind, name: &str) -> Option<BuiltIn> {
@@ -137,6 +156,9 @@ mod tests {
         for name in ["w0", "evq-direction", "psi1", "psi17-direction", "q2", "rank4-mid", "contour-length"] {
             assert_eq!(find(name).unwrap().name(), name);
         }
+        for name in ["EVQ", "Rank4_Mid", " psi2_direction ", "PSI2-Direction"] {
+            assert_eq!(find(name).unwrap().name(), usual(name));
+        }
         assert_eq!(find("psi12-direction").unwrap().column(), "PSI12_DIRECTION");
         assert_eq!(find("psi4").unwrap().rank(), 4);
     }
@@ -146,7 +168,9 @@ mod tests {
         let nearest = |name: &str| find(name).unwrap_err().nearest;
         assert_eq!(nearest("evk").as_deref(), Some("evq"));
         assert_eq!(nearest("psi3-directon").as_deref(), Some("psi3-direction"));
-        for name in ["psi0", "psi", "psi-1", "psi02", "psi99999999999", "EVQ", "", "psi2x", "psiN"] {
+        assert_eq!(nearest("psi0").as_deref(), Some("psi2"));
+        assert_eq!(nearest("psi03").as_deref(), Some("psi3"));
+        for name in ["psi0", "psi", "psi-1", "psi02", "psi99999999999", "e-v-q", "", "psi2x", "psiN"] {
             assert!(find(name).is_err(), "{name}");
         }
         assert_eq!(nearest("temperature"), None);

@@ -1,0 +1,133 @@
+//! HEALPix maps in FITS files.
+//!
+//! [`table`] understands headers, [`read`] fetches values, [`multi_order`] those of cells of several sizes,
+//! [`mod@write`] makes files. The bytes themselves are left to [`crate::cfitsio`].
+
+mod multi_order;
+mod read;
+mod scan;
+mod table;
+mod write;
+
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+use flate2::bufread::MultiGzDecoder;
+use tempfile::NamedTempFile;
+
+use crate::adapter::{gunzipped_head, is_gzip};
+use crate::cfitsio::FitsReader;
+use crate::{About, Adapter, Description, Error, Healpix, Map, Maps, Room, Selection, Sphere, Time};
+
+pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
+
+/// FITS files consist of blocks of this many bytes.
+const BLOCK: u64 = 2880;
+
+/// The adapter for HEALPix maps in FITS files, plain or gzip-compressed.
+pub(crate) struct HealpixFits;
+
+impl Adapter for HealpixFits {
+    fn name(&self) -> &'static str {
+        "HEALPix FITS"
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        let inner = gunzipped_head(head);
+        inner.as_deref().unwrap_or(head).starts_with(b"SIMPLE  =")
+    }
+
+    fn has_ways(&self) -> bool {
+        false
+    }
+
+    fn describe(&self, path: &Path) -> Result<Description, Error> {
+        let mut fits = open(path)?;
+        let tables = scan::healpix_tables(&mut fits)?
+            .into_iter()
+            .map(|hdu| table::Table::parse(&mut fits, hdu)?.describe(&mut fits))
+            .collect::<Result<_, _>>()?;
+        Ok(Description { format: self.name(), tables })
+    }
+
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+        let mut fits = open(path)?;
+        let hdu = scan::choose(&mut fits, selection.hdu)?;
+        let table = table::Table::parse(&mut fits, hdu)?;
+        let column = table.column(selection.field.as_ref())?.clone();
+        Ok(Box::new(One { fits, table, column, selection: selection.clone() }))
+    }
+}
+
+/// The one map of a table.
+struct One {
+    fits: FitsReader,
+    table: table::Table,
+    column: table::Column,
+    selection: Selection,
+}
+
+impl Maps for One {
+    fn times(&self) -> &[Time] {
+        &[]
+    }
+
+    fn about(&self) -> About {
+        let (name, unit) = (self.column.name.clone(), self.column.unit.clone());
+        About { name, unit, coordinates: self.table.coordinates, sphere: Sphere::Sky }
+    }
+
+    fn room(&self) -> Option<Room> {
+        let column = &self.column;
+        let grid = match &self.table.layout {
+            table::Layout::Implicit { named } => self.table.implicit(column, *named).ok()?.0,
+            table::Layout::Explicit { index, .. } => self.table.explicit_grid(index).ok()?,
+            table::Layout::MultiOrder { .. } => Healpix::new(self.selection.nside?).ok()?,
+        };
+        // A mark for each pixel that is named, or a place and a value for each cell.
+        let beside = match self.table.layout {
+            table::Layout::Implicit { .. } => 0,
+            table::Layout::Explicit { .. } => grid.pixels() / 8,
+            table::Layout::MultiOrder { .. } => self.table.rows.saturating_mul(16),
+        };
+        Some(Room::of(grid, beside))
+    }
+
+    fn read(&mut self, _: usize) -> Result<Map, Error> {
+        let mut map = read::read(&mut self.fits, &self.table, &self.column, &self.selection)?;
+        self.about().label(&mut map);
+        Ok(map)
+    }
+}
+
+/// Opens a FITS file. One that is gzip-compressed or whose last block is cut is copied to a temporary file.
+fn open(path: &Path) -> Result<FitsReader, Error> {
+    let mut file = File::open(path).map_err(Error::io("open it"))?;
+    let size = file.metadata().map_err(Error::io("open it"))?.len();
+    let mut magic = Vec::new();
+    file.by_ref().take(2).read_to_end(&mut magic).map_err(Error::io("read it"))?;
+    let whole = magic.as_slice().chain(BufReader::with_capacity(1 << 17, file));
+    if is_gzip(&magic) {
+        unpack(MultiGzDecoder::new(whole))
+    } else if size.is_multiple_of(BLOCK) {
+        FitsReader::open(path)
+    } else {
+        unpack(whole)
+    }
+}
+
+/// Opens a temporary file of the same content.
+fn unpack(mut from: impl Read) -> Result<FitsReader, Error> {
+    let unpack_error = |cause: io::Error| match cause.kind() {
+        // What the decompressor says, but never the operating system.
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+            Error::Gzip { cause }
+        }
+        _ => Error::Io { action: "unpack it to the temporary folder, which TMPDIR names", cause },
+    };
+    let mut copy = NamedTempFile::new().map_err(unpack_error)?;
+    let size = io::copy(&mut from, &mut copy).map_err(unpack_error)?;
+    copy.as_file().set_len(size.next_multiple_of(BLOCK)).map_err(unpack_error)?;
+    FitsReader::open_temporary(copy, size)
+}

@@ -1,0 +1,85 @@
+//! HEALPix FITS files, read and written. Files to read are made byte by byte in [`bytes`], without the FITS library.
+
+mod bytes;
+mod headers;
+mod layouts;
+mod multi_order;
+mod other_files;
+mod paths;
+mod saving;
+mod writing;
+
+use std::path::PathBuf;
+
+use longan_formats::{Error, Field, Map, Selection};
+
+/// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
+const NEST_TO_RING_2: [usize; 48] = [
+    13, 5, 4, 0, 15, 7, 6, 1, 17, 9, 8, 2, 19, 11, 10, 3, 28, 20, 27, 12, 30, 22, 21, 14, 32, 24, 23, 16, 34, 26, 25,
+    18, 44, 37, 36, 29, 45, 39, 38, 31, 46, 41, 40, 33, 47, 43, 42, 35,
+];
+
+/// Values of Nside 2 in RING order, of which no two are equal.
+fn ring_values() -> Vec<f64> {
+    (0..48).map(|p| f64::from(p) * 2.0 - 30.0).collect()
+}
+
+/// The same map in NESTED order.
+fn nested_values() -> Vec<f64> {
+    let ring = ring_values();
+    NEST_TO_RING_2.iter().map(|&p| ring[p]).collect()
+}
+
+/// A file in a folder of its own.
+struct Scratch {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+}
+
+fn scratch(bytes: &[u8]) -> Scratch {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.fits");
+    std::fs::write(&path, bytes).unwrap();
+    Scratch { _folder: folder, path }
+}
+
+/// Reads a file of these bytes.
+fn read_with(bytes: &[u8], selection: &Selection) -> Result<Map, Error> {
+    longan_formats::read(&scratch(bytes).path, selection)
+}
+
+fn read(bytes: &[u8]) -> Result<Map, Error> {
+    read_with(bytes, &Selection::default())
+}
+
+fn field(text: &str) -> Selection {
+    Selection { field: Some(text.parse::<Field>().unwrap()), ..Selection::default() }
+}
+
+/// The problem with a file of these bytes, and what the user is told after the file's name.
+fn problem_with(bytes: &[u8], selection: &Selection) -> (Error, String) {
+    problem(read_with(bytes, selection))
+}
+
+fn problem<T>(result: Result<T, Error>) -> (Error, String) {
+    let Err(Error::File { path, problem }) = result else { panic!("no error, or none that names the file") };
+    let (told, all) = (problem.to_string(), Error::File { path: path.clone(), problem: Box::new(Error::Exists) });
+    assert!(all.to_string().starts_with(&path.display().to_string().replace(char::is_control, "\u{fffd}")));
+    assert!(!told.contains('\n') && !told.ends_with('.') && !told.contains("map.fits"), "{told}");
+    (*problem, told)
+}
+
+/// Asserts that two maps have the same bits, NaN equal to NaN.
+#[track_caller]
+fn assert_same(found: &[f64], expected: &[f64]) {
+    assert_eq!(found.len(), expected.len());
+    for (p, (f, e)) in found.iter().zip(expected).enumerate() {
+        assert!(f == e || f.is_nan() && e.is_nan(), "pixel {p}: {f} instead of {e}");
+    }
+}
+
+/// Says on the terminal, past the test runner's capture, that a test did not run.
+fn skipped(test: &str, why: &str) {
+    use std::io::Write;
+    std::io::stderr().write_all(format!("skipped {test}: {why}\n").as_bytes()).unwrap();
+}
