@@ -36,7 +36,9 @@ pub(crate) const BETA: Kind = Kind {
     needs: |_| Needs { ranks: vec![0, 2], ..Needs::default() },
     evaluate: |_, w| {
         let [larger, smaller] = eigenvalues(w);
-        (larger > 0.0 && smaller >= -w.resolution * w.psi0.abs()).then(|| smaller.max(0.0) / larger)
+        // What is not told apart from 0 is 0, or its rounding would be compared.
+        let least = w.resolution * w.psi0.abs();
+        (larger > 0.0 && smaller >= -least).then(|| if smaller > least { smaller / larger } else { 0.0 })
     },
 };
 
@@ -81,7 +83,8 @@ mod tests {
         let window = |resolution| Window { psi0: 1.0, ranks: &[2], psi: &psi, resolution, ..Window::default() };
         assert_eq!(find("evq").unwrap().evaluate(&window(1e-7)), None);
         assert!(find("evq").unwrap().evaluate(&window(1e-12)).unwrap() > 1e9);
-        assert!(find("beta").unwrap().evaluate(&window(1e-7)).unwrap() < 1e-9);
+        assert_eq!(find("beta").unwrap().evaluate(&window(1e-7)), Some(0.0));
+        assert!(find("beta").unwrap().evaluate(&window(1e-12)).unwrap() > 1e-10);
     }
 
     #[test]
