@@ -85,7 +85,7 @@ pub(crate) struct Said(Mutex<HashSet<String>>);
 impl Said {
     /// Says what there is to say of a file's maps on standard error, unless it was said of another file.
     pub(crate) fn say(&self, running: &Running, path: &Path, map: &Map) {
-        self.say_note(running, path, unusual(map));
+        self.say_note(running, path, note(map));
         if let Some(warning) = warning(path, map).filter(|warning| self.is_new(path, warning)) {
             running.warn(warning);
         }

@@ -17,7 +17,8 @@ use super::regridding;
 
 /// Area, length, curvature and Euler characteristic of the body, at each threshold, over the whole sphere.
 ///
-/// By Gauss-Bonnet the Euler characteristic is (area + curvature)/2 pi; it is left empty where pixels are masked. A field
+/// By Gauss-Bonnet the Euler characteristic is (area + curvature)/2 pi; it is left empty where pixels are masked. Area and
+/// length are those of the unmasked cells, and so is the curvature, made up for the cells' edges beside masked ones. A field
 /// with several times has all rows for each.
 #[derive(Args, Debug)]
 #[command(after_help = "\
