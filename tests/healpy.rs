@@ -168,11 +168,11 @@ for name in sorted(glob.glob('*.fits')):
         nest = hp.reorder(m, r2n=True)
         write(group, 'nest.fits', nest, nest=True, dtype=np.float64)
         write(group, 'nest32.fits.gz', nest, nest=True, dtype=np.float32, fits_IDL=False)
-        write(group, 'nestcolumns.fits', [nest, nest[::-1]], nest=True, dtype=np.float64)
+        write(group, 'nestcolumns.fits', [nest, nest[::-1]], nest=True, dtype=np.float64, column_names=['T', 'Q'])
     # healpy has no type for the pixel numbers of the smallest maps.
     if nside > 3:
         write(group, 'partial.fits', m, partial=True, dtype=np.float64)
-        write(group, 'partial32.fits', [m, m], partial=True, dtype=np.float32)
+        write(group, 'partial32.fits', [m, m], partial=True, dtype=np.float32, column_names=['T', 'Q'])
         write(group, 'partialnest.fits', nest, nest=True, partial=True, dtype=np.float64)
 assert count > 80, count
 "#,

@@ -93,7 +93,7 @@ impl Samples {
     /// # Errors
     /// Where the settings are impossible, or missing where all samples are at one place.
     pub(crate) fn gather(&self, nside: Option<usize>, regrid: &Regrid) -> Result<Map, Error> {
-        let Plan { places, grid, reach, gather, regridded } = self.plan(nside, regrid)?;
+        let Plan { places, grid, reach, gather, mut regridded } = self.plan(nside, regrid)?;
         let reach = (reach < PI).then(|| chord(reach).powi(2));
         // The value of the nearest sample, where it is within reach.
         let near = |direction| {
@@ -104,9 +104,14 @@ impl Samples {
             Gather::Nearest => chart(grid, |_, direction| near(direction).unwrap_or(f64::NAN)),
             Gather::Mean => {
                 let means = self.means(grid);
-                chart(grid, |pixel, direction| {
+                let map = chart(grid, |pixel, direction| {
                     near(direction).map_or(f64::NAN, |near| means.get(&pixel).copied().unwrap_or(near))
-                })
+                })?;
+                let unmasked = (0..grid.pixels()).filter(|&pixel| !map.values()[pixel].is_nan());
+                let (all, held) =
+                    unmasked.fold((0, 0), |(all, held), pixel| (all + 1, held + u32::from(means.contains_key(&pixel))));
+                regridded.empty = 1.0 - f64::from(held) / f64::from(all.max(1));
+                Ok(map)
             }
             Gather::Gaussian { fwhm } => {
                 let sigma = positive("the width of the Gaussian", fwhm)? / (8.0 * LN_2).sqrt();

@@ -24,7 +24,7 @@ use super::jobs::Jobs;
 use super::mapping::Mapping;
 use super::mismatch::Together;
 use super::misused;
-use super::options::{Format, Running, between, check_memory, print, shown, whole};
+use super::options::{Format, Running, between, check_apart, check_memory, print, shown, whole};
 use super::output::{command, creator, integer, numbered, real, text};
 use super::progress::Progress;
 use super::sink::{self, Kind, MapColumn, Step, Table};
@@ -309,13 +309,7 @@ impl Arguments {
         let outputs: Vec<&Path> =
             std::iter::once(self.output.as_path()).chain(scatter.iter().flat_map(Scatter::outputs)).collect();
         Kind::of(&self.output)?;
-        for path in self.inputs().chain(self.mapping.mask()) {
-            for output in &outputs {
-                if let (Ok(from), Ok(to)) = (path.canonicalize(), output.canonicalize()) {
-                    ensure!(from != to, "{}: the output would replace this input; choose another", shown(path));
-                }
-            }
-        }
+        outputs.iter().try_for_each(|output| check_apart(output, self.inputs().chain(self.mapping.mask())))?;
         outputs.iter().try_for_each(|output| formats::check_writable(output, self.overwrite))?;
         for path in &self.simulations {
             let simulation = path.canonicalize().unwrap_or_else(|_| path.clone());

@@ -23,7 +23,9 @@ use super::drawn::{Form, save};
 use super::input::{Input, Mask, of};
 use super::mapping::{find, no_measure};
 use super::mismatch::Together;
-use super::options::{BodyOptions, ContourOption, Running, WeightOption, between, check_memory, nside, shown};
+use super::options::{
+    BodyOptions, ContourOption, Running, WeightOption, between, check_apart, check_memory, nside, shown,
+};
 use super::plugin::Plugins;
 use super::progress::Progress;
 use super::{mismatch, misused, regridding};
@@ -316,11 +318,8 @@ impl Arguments {
             None => (None, output.clone()),
         };
         for path in picture.iter().map(|(path, _)| path).chain([&table]) {
-            for source in self.inputs.iter().chain(&self.ensemble).chain(&self.input.mask) {
-                if let (Ok(from), Ok(to)) = (source.canonicalize(), path.canonicalize()) {
-                    ensure!(from != to, "{}: the output would replace this input; choose another", shown(source));
-                }
-            }
+            let inputs = self.inputs.iter().chain(&self.ensemble).chain(&self.input.mask);
+            check_apart(path, inputs.map(PathBuf::as_path))?;
             formats::check_writable(path, self.overwrite)?;
         }
         Ok(Outputs { picture, table })

@@ -14,7 +14,7 @@ use longan::formats::{self, CardValue, Error, TableDescription};
 
 use super::jobs::Jobs;
 use super::mapping::{Made, Mapper, Mapping};
-use super::options::{Running, is_same_file, shown};
+use super::options::{Running, check_apart, is_same_file, shown};
 use super::output::command;
 use super::progress::{Progress, rate};
 use super::regridding;
@@ -139,11 +139,7 @@ impl Arguments {
                     shown(&output)
                 );
             }
-            for source in std::iter::once(input.as_path()).chain(self.mapping.mask()) {
-                if let (Ok(from), Ok(to)) = (source.canonicalize(), output.canonicalize()) {
-                    ensure!(from != to, "{}: the output would replace this input; choose another", shown(source));
-                }
-            }
+            check_apart(&output, std::iter::once(input.as_path()).chain(self.mapping.mask()))?;
             tasks.push((input.as_path(), output));
         }
         if into_folder {

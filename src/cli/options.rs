@@ -193,6 +193,16 @@ pub(crate) fn is_same_file(one: &Path, other: &Path) -> bool {
     }
 }
 
+/// Refuses an output that would replace one of the inputs.
+pub(crate) fn check_apart<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> anyhow::Result<()> {
+    for input in inputs {
+        if let (Ok(from), Ok(to)) = (input.canonicalize(), output.canonicalize()) {
+            anyhow::ensure!(from != to, "{}: the output would replace this input; choose another", shown(input));
+        }
+    }
+    Ok(())
+}
+
 /// A path on one line.
 pub(crate) fn shown(path: &Path) -> String {
     path.display().to_string().replace(char::is_control, "\u{fffd}")

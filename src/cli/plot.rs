@@ -22,7 +22,7 @@ use super::drawn::{Form, save};
 use super::input::{Input, Mask, field, place};
 use super::mismatch::of_coordinates;
 use super::misused;
-use super::options::{Running, finite, shown};
+use super::options::{Running, check_apart, finite, shown};
 use super::regridding;
 
 /// A picture of a map: PNG, or SVG whose lines and letters stay sharp at any size.
@@ -152,6 +152,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let projection = arguments.projection()?;
     let no_form = || format!("{}: the name does not say which picture to write; end it in .png or .svg", shown(output));
     let form = Form::of(output).with_context(no_form)?;
+    let inputs = std::iter::once(path).chain(&arguments.input.mask).chain(&arguments.contour);
+    check_apart(output, inputs.map(PathBuf::as_path))?;
     formats::check_writable(output, arguments.overwrite)?;
     let mask = arguments.input.mask(running)?;
     let map = arguments.read(&arguments.input, path, mask.as_ref())?;

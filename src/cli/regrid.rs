@@ -4,13 +4,13 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use clap::Args;
 use longan::formats::{self, Map};
 use longan::statistics::{Statistics, statistics};
 
 use super::input::Input;
-use super::options::{Running, decimals, shown};
+use super::options::{Running, check_apart, decimals, shown};
 use super::output::{command, input_cards, mask_cards, text};
 use super::progress::Progress;
 use super::regridding;
@@ -47,11 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let start = Instant::now();
     let Arguments { input_file: path, output, input, layout, overwrite, running } = arguments;
     let kind = Kind::of(output)?;
-    for source in std::iter::once(path).chain(&input.mask) {
-        if let (Ok(from), Ok(to)) = (source.canonicalize(), output.canonicalize()) {
-            ensure!(from != to, "{}: the output would replace this input; choose another", shown(source));
-        }
-    }
+    check_apart(output, std::iter::once(path).chain(&input.mask).map(PathBuf::as_path))?;
     formats::check_writable(output, *overwrite)?;
     let mask = input.mask(running)?;
     let mut series = input.open(path)?;

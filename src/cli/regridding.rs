@@ -31,9 +31,10 @@ pub(crate) fn note(map: &Map) -> Option<String> {
     let few = map.regridded.filter(|regridded| regridded.by_default).and_then(|regridded| regridded.smoother());
     unusual(map).or_else(|| {
         let smoother = Way::Points(few?);
+        let percent = 100.0 * map.regridded?.empty;
         Some(format!(
-            "means of fewer than two points a pixel, which make contours too long; --gather {smoother} or a smaller --nside \
-             does without"
+            "means of the points in each pixel: {percent:.0} % of the pixels hold none, so contours come out too long; \
+             --gather {smoother} or a smaller --nside avoids that"
         ))
     })
 }

@@ -181,4 +181,10 @@ fn arguments_that_make_no_sense() {
     folder.done("plot sky.fits -o a.png -q");
     folder.refused("plot sky.fits -o a.png", &["a.png", "--overwrite"]);
     folder.done("plot sky.fits -o a.png -q --overwrite");
+    // Maps may have any name, and no picture takes their place.
+    std::fs::copy(folder.path("sky.fits"), folder.path("map.png")).unwrap();
+    for inputs in ["map.png", "sky.fits --mask map.png", "sky.fits --contour map.png --contour-threshold 1"] {
+        let words = format!("plot {inputs} -o map.png --overwrite");
+        folder.refused(&words, &["map.png: the output would replace this input"]);
+    }
 }
