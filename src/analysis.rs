@@ -184,7 +184,7 @@ pub struct MinkowskiMaps {
     pub of_map: Statistics,
     /// For each measure, in the order given, its values in RING order; NaN where masked or undefined.
     pub values: Vec<Vec<f64>>,
-    /// Windows of which too large a share is masked; all measures are undefined there.
+    /// Number of windows of which too large a share is masked; all measures are undefined there.
     pub masked: usize,
     /// How windows were summed.
     pub ways: Ways,
@@ -337,6 +337,7 @@ impl Analysis {
             false => vec![thresholds.clone()],
         };
         let columns = measures.len() + 1;
+        let relative: Vec<bool> = measures.iter().map(|measure| measure.as_ref().is_relative()).collect();
         let evaluate = |batch: &mut [Moments], values: &mut [f64]| {
             batch.iter_mut().for_each(|moments| moments.scale_up(self.weight));
             let masked =
@@ -348,17 +349,17 @@ impl Analysis {
             values.fill(f64::NAN);
             for (i, measure) in measures.iter().map(AsRef::as_ref).enumerate() {
                 measure.evaluate_all(&windows, &mut column)?;
-                let is_relative = measure.is_relative();
                 for ((&place, value), window) in places.iter().zip(&column).zip(&windows) {
                     // What was made up for masked cells is no evidence.
                     let seen = window.length * (1.0 - window.masked_fraction);
-                    if !is_relative || seen >= self.min_contour * batch[place].radius {
+                    if !relative[i] || seen >= self.min_contour * batch[place].radius {
                         values[place * columns + i] = *value;
                     }
                 }
             }
-            // The last column tells which windows are not masked.
-            places.iter().for_each(|place| values[place * columns + measures.len()] = 1.0);
+            // The last column tells which windows are not lost to the mask; those without pixels are lost to their size.
+            let kept = batch.iter().enumerate().filter(|(_, moments)| moments.pixels == 0 || !masked(moments));
+            kept.for_each(|(place, _)| values[place * columns + measures.len()] = 1.0);
             Ok::<(), MeasureError>(())
         };
         let field = Field::new(map.grid(), map.values(), &thresholds, self.body);

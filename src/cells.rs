@@ -164,7 +164,6 @@ impl CellRing {
     /// the number of its first corner; a triangle has no fourth.
     pub(crate) fn beyond(&self, stencil: &Stencil, sector: usize) -> [Option<(usize, usize)>; 4] {
         let (n, i, count) = (self.nside, self.ring, stencil.count);
-        let is_pole = i == 0 || i == 4 * n;
         std::array::from_fn(|edge| {
             let (from, to) = (stencil.corners[edge], stencil.corners[(edge + 1) % count]);
             let west = stencil.corners[0];
@@ -172,14 +171,6 @@ impl CellRing {
             // one east of a pixel.
             let east_of = match (from.ring == i, to.ring == i) {
                 _ if edge >= count => return None,
-                // About a pole, of the western of two pixels.
-                _ if is_pole => {
-                    if i == 0 {
-                        from
-                    } else {
-                        to
-                    }
-                }
                 // Of two pixels on different rings, that cell lies west or east of the one on the other ring.
                 (true, false) => {
                     if from == west {
@@ -195,7 +186,7 @@ impl CellRing {
                         from
                     }
                 }
-                // Both are on the next ring from the pole: the cell between them there.
+                // Both are on the next ring from the pole, or about it: the cell between them there.
                 (false, false) => {
                     if i < n {
                         from

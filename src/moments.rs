@@ -37,8 +37,8 @@ pub struct Selection {
 
 /// Where each selected quantity stands among the rows of a ring.
 ///
-/// The shares that are masked come first, and the edges lost, then for each group of thresholds the plain rows, W0 to W2, then for each group
-/// those of ψ_s. A group is one threshold where these are kept by themselves, else there is one group of them all.
+/// The shares that are masked come first, and the edges lost, then for each group of thresholds the plain rows, W0 to W2,
+/// then for each group those of ψ_s. A group is one threshold where these are kept by themselves, else there is one group of them all.
 #[derive(Clone, Debug)]
 pub struct Layout {
     /// Cell shares that are masked, of the four that each pixel has. Absent where nothing is masked.

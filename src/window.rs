@@ -48,9 +48,12 @@ pub struct Moments {
     pub centre: (f64, f64),
     /// Its radius in radians.
     pub radius: f64,
+    /// Number of pixels in the window.
+    pub pixels: u64,
     /// Share of the window's cells that are masked; 1 for a window without pixels.
     pub masked_fraction: f64,
-    /// Share of the edges of the window's pixels that lie beside a masked cell; 0 where no curvature is selected.
+    /// Share of the edges of the window's pixels that lie beside a masked cell, 0 where no curvature is selected; 1 for a
+    /// window without pixels.
     pub lost_edges: f64,
     /// W0 in steradian; 0 unless selected, as the following.
     pub area: f64,
@@ -420,15 +423,14 @@ fn visited<E>(
             let selected = |row: Option<usize>| row.map_or(0.0, |row| mean(row + group * layout.plain));
             moments.radius = ring.radius;
             moments.centre = (ring.theta, ring.phi_of(quadrant * ring.in_quadrant + k));
-            moments.masked_fraction = match (sums.pixels[k], layout.masked) {
+            moments.pixels = sums.pixels[k];
+            let share = |row: Option<usize>| match (moments.pixels, row) {
                 (0, _) => 1.0,
-                (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
                 (_, None) => 0.0,
-            };
-            moments.lost_edges = match (sums.pixels[k], layout.lost_edges) {
-                (0, _) | (_, None) => 0.0,
                 (pixels, Some(row)) => sum(row) / (SHARES as u64 * pixels) as f64,
             };
+            moments.masked_fraction = share(layout.masked);
+            moments.lost_edges = share(layout.lost_edges);
             moments.area = selected(layout.area);
             moments.length = selected(layout.length);
             moments.curvature = selected(layout.curvature);

@@ -281,7 +281,7 @@ impl Reader<'_> {
         if name.is_empty() {
             return Err(Fault { at: 0..1, problem: "a name is missing, as in 'x = …',".to_owned() });
         }
-        if let Some(known) = known(&name.to_ascii_lowercase()).filter(|known| known.name() != LONG_A_FORMULA) {
+        if let Some(known) = find(name).ok().filter(|known| known.name() != LONG_A_FORMULA) {
             let problem = format!("'{}' is a measure already, so choose another name than the one", known.name());
             return Err(Fault { at: 0..name.len(), problem });
         }
@@ -487,7 +487,9 @@ impl Reader<'_> {
         let is_of_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let start = self.text[..at.start].rfind(|c| !is_of_name(c)).map_or(0, |i| i + 1);
         let end = self.text[at.start..].find(|c| !is_of_name(c)).map_or(self.text.len(), |i| at.start + i);
-        if let Some(measure) = Some(&self.text[start..end]).filter(|whole| whole.contains('-')).and_then(known) {
+        if let Some(measure) =
+            Some(&self.text[start..end]).filter(|whole| whole.contains('-')).and_then(|name| find(name).ok())
+        {
             let name = written(&measure.name());
             let problem = format!("a hyphen is a subtraction in a formula, so write '{name}' for the name");
             return Fault { at: start..end, problem };
@@ -503,15 +505,10 @@ fn written(name: &str) -> String {
     name.replace('-', "_")
 }
 
-/// The built-in measure of this name, however its words are joined.
-fn known(name: &str) -> Option<BuiltIn> {
-    find(name).ok()
-}
-
 /// What a name stands for.
 fn input(name: &str) -> Option<Input> {
     let name = name.to_lowercase();
-    let Some((moment, part)) = name.split_once('.') else { return known(&name).map(Input::Measure) };
+    let Some((moment, part)) = name.split_once('.') else { return find(&name).ok().map(Input::Measure) };
     let digits = moment.strip_prefix("psi")?;
     let rank: u32 = digits.parse().ok()?;
     match part {

@@ -18,7 +18,7 @@ pub(crate) const EVQ: Kind = Kind {
     rank: Some(2),
     unit: "",
     definition: "eigenvalue quotient of the rank 2 tensor, larger over smaller by magnitude, where both have one sign: \
-                 (|ψ_0| + |ψ_2|)/(|ψ_0| − |ψ_2|); it has no bound, so means are better taken of beta or q2",
+                 (|ψ_0| + |ψ_2|)/(|ψ_0| − |ψ_2|)",
     needs: |_| Needs { ranks: vec![0, 2], ..Needs::default() },
     evaluate: |_, w| {
         let [larger, smaller] = eigenvalues(w);
@@ -47,7 +47,8 @@ pub(crate) const EVQ_DIRECTION: Kind = Kind {
     pattern: "evq-direction",
     rank: Some(2),
     unit: "deg",
-    definition: "direction of the algebraically larger eigenvalue's vector, arg(ψ_2)/2, in (−90°, 90°], from south towards east",
+    definition: "direction of the algebraically larger eigenvalue's vector, arg(ψ_2)/2, in (−90°, 90°], from south \
+                 towards east",
     needs: |_| Needs { ranks: vec![2], ..Needs::default() },
     evaluate: |_, w| direction(w.psi(2), 2),
 };

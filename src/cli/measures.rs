@@ -88,7 +88,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                  The body is where the field is at or above a threshold (the paper's text takes what is below: --body below).\n\
                  A cell with a masked corner counts nothing, so a lone masked pixel masks four cells. Areas, lengths and ψ_s\n\
                  are divided by the unmasked share of the window's cells, curvatures by that of its edges; contour-length\n\
-                 is not. For a window with hardly any contour, ratios and directions are left to chance: --min-contour.\n\
+                 is not. For a window with hardly any contour, ratios and directions are left to chance: --min-contour. EVQ has\n\
+                 no bound, so take means of beta or q2 instead.\n\
                  `longan measures --help` says how to write formulas of these, and how to add measures by plugins."
             )?;
         }

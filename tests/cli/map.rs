@@ -210,6 +210,9 @@ fn a_line_says_which_thresholds_and_which_windows_are_lost_to_what() {
     let line = folder.done("map sky.fits -o out.fits --overwrite --thresholds 2.5 --threshold-unit sigma --window 3");
     let lost = folder.read("out.fits", "EVQ").values().iter().filter(|value| value.is_nan()).count();
     assert!(line.contains(&format!("{lost} of 3072 windows without contour")) && line.contains("--window"), "{line}");
+    // Windows that hold no pixel are not lost to a mask that there is not.
+    let line = folder.done("map sky.fits -o out.fits --overwrite --measure w0 --window 1 --nside-out 64");
+    assert!(!line.contains("mask)") && line.contains("of 49152 windows without contour"), "{line}");
     let line = folder.done("map sky.fits -o out.fits --overwrite --min-contour 3");
     assert!(line.contains("windows with too little contour") && line.contains("--min-contour"), "{line}");
 }
