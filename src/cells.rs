@@ -160,6 +160,25 @@ impl CellRing {
         Stencil { corners, count, meridian }
     }
 
+    /// Which cells of the ring have a corner among the pixels told, of which the first has the RING index `first`.
+    pub(crate) fn with_corners(&self, told: &[bool], first: usize) -> Vec<bool> {
+        let cells = self.stencils * self.sectors;
+        let mut found = vec![false; cells];
+        // Within a run, in a cap that of a sector, all corners but those of the last cell are at neighbouring pixels.
+        let run = if self.near.iter().all(|near| near.per_sector == 1) { cells } else { self.stencils };
+        for start in (0..cells).step_by(run) {
+            let last = start + run - 1;
+            for (cell, count) in [(start, run - 1), (last, 1)] {
+                let (stencil, sector) = (self.stencil(cell % self.stencils), cell / self.stencils);
+                for corner in stencil.pixels(sector)[..stencil.count].iter().filter(|_| count > 0) {
+                    let told = &told[corner.index - first..];
+                    found[cell..cell + count].iter_mut().zip(told).for_each(|(found, told)| *found |= told);
+                }
+            }
+        }
+        found
+    }
+
     /// The cells beyond the edges of a stencil's copy in this sector, each by its ring and its place there. An edge has
     /// the number of its first corner; a triangle has no fourth.
     pub(crate) fn beyond(&self, stencil: &Stencil, sector: usize) -> [Option<(usize, usize)>; 4] {

@@ -89,43 +89,45 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Which cells have masked corners, on the cell rings gone through and the one beside these on either side.
+/// Which cells have masked corners, on some cell rings.
 struct MaskedCells {
     /// The first of these cell rings.
     first: usize,
     /// For each ring, for each cell.
     rings: Vec<Vec<bool>>,
+    /// Likewise, whether one of the cells beyond its edges has masked corners.
+    beside: Vec<Vec<bool>>,
 }
 
 impl MaskedCells {
-    /// Nothing where no cell of these rings has a masked corner.
-    fn find(field: &Field<'_>, rings: &Range<usize>) -> Option<Self> {
-        let past = 4 * field.grid.nside() + 1;
-        let around = rings.start.saturating_sub(1)..(rings.end + 1).min(past);
-        let (first, last) = field.corner_rings(&around);
-        let (from, last) = (field.grid.ring(first).start, field.grid.ring(last));
-        if !field.values[from..last.start + last.len].iter().any(|value| value.is_nan()) {
+    /// The cells on these rings, by the bins of their corners, of which the first is that of pixel `first`; nothing where
+    /// no pixel is masked.
+    fn find(grid: Healpix, rings: Range<usize>, first: usize, bins: &[u16]) -> Option<Self> {
+        let pixels: Vec<bool> = bins.iter().map(|bin| *bin == MASKED).collect();
+        if !pixels.contains(&true) {
             return None;
         }
-        let of_ring = |i| {
-            let ring = CellRing::new(field.grid, i);
-            let mut masked = vec![false; ring.stencils * ring.sectors];
-            for k in 0..ring.stencils {
-                let stencil = ring.stencil(k);
-                for sector in 0..ring.sectors {
-                    // A triangle's fourth corner repeats its first.
-                    let pixels = stencil.pixels(sector);
-                    masked[sector * ring.stencils + k] = pixels.iter().any(|p| field.values[p.index].is_nan());
-                }
+        let of_ring = |i| CellRing::new(grid, i).with_corners(&pixels, first);
+        let masked: Vec<_> = rings.clone().map(of_ring).collect();
+        let mut beside: Vec<_> = masked.iter().map(|ring| vec![false; ring.len()]).collect();
+        for (i, masked) in rings.clone().zip(&masked) {
+            let ring = CellRing::new(grid, i);
+            for (cell, _) in masked.iter().enumerate().filter(|(_, masked)| **masked) {
+                let (sector, k) = (cell / ring.stencils, cell % ring.stencils);
+                let beyond = ring.beyond(&ring.stencil(k), sector).into_iter().flatten();
+                beyond.filter(|(i, _)| rings.contains(i)).for_each(|(i, cell)| beside[i - rings.start][cell] = true);
             }
-            masked
-        };
-        Some(MaskedCells { first: around.start, rings: around.map(of_ring).collect() })
+        }
+        Some(MaskedCells { first: rings.start, rings: masked, beside })
     }
 
     /// Beyond which edges of a cell there is a masked cell.
-    fn beyond(&self, ring: &CellRing, stencil: &Stencil, sector: usize) -> [bool; 4] {
-        let is_masked = |(ring, column): (usize, usize)| self.rings[ring - self.first][column];
+    #[inline(always)]
+    fn beyond(&self, i: usize, ring: &CellRing, k: usize, stencil: &Stencil, sector: usize) -> [bool; 4] {
+        if !self.beside[i - self.first][sector * ring.stencils + k] {
+            return [false; 4];
+        }
+        let is_masked = |(ring, cell): (usize, usize)| self.rings[ring - self.first][cell];
         ring.beyond(stencil, sector).map(|cell| cell.is_some_and(is_masked))
     }
 }
@@ -263,7 +265,8 @@ impl End<'_> {
     /// The part of the exterior angle in radians.
     #[inline(always)]
     pub fn angle(&self) -> f64 {
-        self.sin.atan2(self.cos)
+        // The cosine is not negative, and this is faster than `atan2`.
+        (self.sin / self.cos).atan()
     }
 
     /// At both corners of the edge, e^{iϕ} of the edge's direction out of the body and of the segment's normal, after
@@ -308,8 +311,12 @@ pub trait Sink {
 /// Inlined, so that callers compiled for a processor's own instructions make use of them here.
 #[inline(always)]
 pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
-    let (first, bins_of) = field.bins(&rings);
-    let masked_cells = if sink.wants_edges() { MaskedCells::find(field, &rings) } else { None };
+    // With the cells beyond the edges of these.
+    let past = 4 * field.grid.nside() + 1;
+    let around =
+        if sink.wants_edges() { rings.start.saturating_sub(1)..(rings.end + 1).min(past) } else { rings.clone() };
+    let (first, bins_of) = field.bins(&around);
+    let masked_cells = if sink.wants_edges() { MaskedCells::find(field.grid, around, first, &bins_of) } else { None };
     for i in rings {
         let ring = CellRing::new(field.grid, i);
         let mut known: Option<(Geometry, f64)> = None;
@@ -328,7 +335,7 @@ pub fn march(field: &Field<'_>, rings: Range<usize>, sink: &mut impl Sink) {
                     continue;
                 }
                 let masked_beyond = match &masked_cells {
-                    Some(cells) => cells.beyond(&ring, &stencil, sector),
+                    Some(cells) => cells.beyond(i, &ring, k, &stencil, sector),
                     None => [false; 4],
                 };
                 let cell = Cell { ring: i, pixels: &pixels, count: stencil.count(), masked_beyond };

@@ -122,6 +122,11 @@ impl Layout {
         self.weight == Weight::Curvature && !self.ranks.is_empty()
     }
 
+    /// Whether anything is made of curvature.
+    fn has_curvature(&self) -> bool {
+        self.curvature.is_some() || self.is_by_curvature()
+    }
+
     /// The row of Re ψ_s of a group's first rank.
     #[inline(always)]
     fn psi_of(&self, group: usize) -> usize {
@@ -167,25 +172,31 @@ pub fn at_pixels(field: &Field<'_>, layout: &Layout, rings: Range<usize>) -> Vec
         let len = field.grid().ring(i).len;
         RingMoments { data: vec![0.0; layout.rows * len], len }
     });
-    let mut gather = Gather {
-        layout,
-        first: rings.start,
-        rings: moments.collect(),
-        same_ring: Vec::new(),
-        cell: vec![[0.0; 4]; layout.rows],
-        touched: 0..0,
-    };
     // A pixel's cells lie on its own ring and the two beside it.
-    march_into(field, rings.start - 1..rings.end + 1, &mut gather);
+    let cells = rings.start - 1..rings.end + 1;
+    let (rings, first) = (moments.collect(), rings.start);
+    if layout.has_curvature() {
+        curved(field, cells, Gather::new(layout, first, rings))
+    } else {
+        straight(field, cells, Gather::new(layout, first, rings))
+    }
+}
+
+/// Marches where curvature is selected.
+#[multiversion::multiversion(targets = "simd")]
+fn curved(field: &Field<'_>, cells: Range<usize>, mut gather: Gather<'_, true>) -> Vec<RingMoments> {
+    march(field, cells, &mut gather);
     gather.rings
 }
 
+/// Marches where no curvature is selected, which costs nothing then.
 #[multiversion::multiversion(targets = "simd")]
-fn march_into(field: &Field<'_>, rings: Range<usize>, gather: &mut Gather<'_>) {
-    march(field, rings, gather);
+fn straight(field: &Field<'_>, cells: Range<usize>, mut gather: Gather<'_, false>) -> Vec<RingMoments> {
+    march(field, cells, &mut gather);
+    gather.rings
 }
 
-struct Gather<'a> {
+struct Gather<'a, const CURVATURE: bool> {
     layout: &'a Layout,
     first: usize,
     rings: Vec<RingMoments>,
@@ -198,7 +209,12 @@ struct Gather<'a> {
     touched: Range<usize>,
 }
 
-impl Gather<'_> {
+impl<'a, const CURVATURE: bool> Gather<'a, CURVATURE> {
+    fn new(layout: &'a Layout, first: usize, rings: Vec<RingMoments>) -> Self {
+        let cell = vec![[0.0; 4]; layout.rows];
+        Gather { layout, first, rings, same_ring: Vec::new(), cell, touched: 0..0 }
+    }
+
     /// Where to add what a cell gives to one of its corners, and that ring's length; nowhere for other rings.
     #[inline(always)]
     fn target(&mut self, cell: Cell<'_>, pixel: Pixel) -> Option<(&mut [f64], usize)> {
@@ -220,7 +236,7 @@ impl Gather<'_> {
     #[inline(always)]
     fn add(&mut self, cell: Cell<'_>, segment: &Segment<'_>, group: usize) {
         let layout = self.layout;
-        if layout.curvature.is_some() || layout.is_by_curvature() {
+        if CURVATURE {
             self.add_curvature(cell, segment, group);
         }
         let by_length = layout.weight == Weight::Length && !layout.ranks.is_empty();
@@ -278,32 +294,28 @@ impl Gather<'_> {
     }
 }
 
-impl Sink for Gather<'_> {
+impl<const CURVATURE: bool> Sink for Gather<'_, CURVATURE> {
     fn wants_area(&self) -> bool {
         self.layout.area.is_some()
     }
 
     fn wants_edges(&self) -> bool {
-        self.layout.lost_edges.is_some()
+        CURVATURE && self.layout.lost_edges.is_some()
     }
 
     fn masked(&mut self, cell: Cell<'_>, _: f64) {
         let Layout { masked, lost_edges, .. } = *self.layout;
-        let mut add = |row: usize, corner: usize, value: f64| {
-            let pixel = cell.pixels[corner];
-            if let Some((data, len)) = self.target(cell, pixel) {
-                data[row * len + pixel.column] += value;
-            }
-        };
-        for corner in 0..cell.count {
+        // An edge between two masked cells is met twice.
+        let lost = |edge: usize| if cell.masked_beyond[edge] { 0.5 } else { 1.0 };
+        for (corner, &pixel) in cell.pixels[..cell.count].iter().enumerate() {
+            let before = if corner == 0 { cell.count } else { corner } - 1;
+            let edges = lost(before) + lost(corner);
+            let Some((data, len)) = self.target(cell, pixel) else { continue };
             if let Some(row) = masked {
-                add(row, corner, 1.0);
+                data[row * len + pixel.column] += 1.0;
             }
             if let Some(row) = lost_edges {
-                // An edge between two masked cells is met twice.
-                let edge = if cell.masked_beyond[corner] { 0.5 } else { 1.0 };
-                add(row, corner, edge);
-                add(row, cell.next(corner), edge);
+                data[row * len + pixel.column] += edges;
             }
         }
     }
