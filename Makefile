@@ -60,7 +60,7 @@ bench: setup ## compare longan's speed with that of its peers (NSIDE=512), plugi
 	else echo "bench: no cdo or nccopy, so regridding is not compared with it" >&2; fi
 
 install: setup ## install longan with cargo
-	cargo install --path . --locked
+	cargo install --path cli --locked
 
 clean: ## remove what was built
 	cargo clean

@@ -8,9 +8,10 @@ use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
 
-use longan::formats::{Column, Extension, HealpixLayout, HealpixWriter, Map, Ordering};
+use longan::Healpix;
 use longan::simulate::{Body, Edge, Shape, Waves, shapes};
-use longan::{Healpix, formats};
+use longan_formats::{self as formats, Column, Extension, HealpixLayout, HealpixWriter};
+use longan_grid::{Map, Ordering};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).ok_or("name a folder to write to")?;

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use longan_formats::{Healpix, Map};
+use longan_grid::{Healpix, Map};
 use longan_measures::{Measure, MeasureError, Window};
 
 use crate::contour::{Body, Field};

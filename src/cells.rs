@@ -12,7 +12,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use longan_formats::{Healpix, Ring};
+use longan_grid::{Healpix, Ring};
 
 use crate::angles;
 

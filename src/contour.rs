@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use longan_formats::Healpix;
+use longan_grid::Healpix;
 use num_complex::Complex64;
 use rayon::prelude::*;
 

@@ -19,7 +19,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
-use longan_formats::Map;
+use longan_grid::Map;
 use rayon::prelude::*;
 
 use crate::cells::{CellRing, Geometry};
@@ -140,7 +140,7 @@ impl Edges {
 mod tests {
     use super::*;
     use crate::simulate::Waves;
-    use longan_formats::Healpix;
+    use longan_grid::Healpix;
 
     fn map(nside: usize, value: impl Fn(f64, f64) -> f64) -> Map {
         let grid = Healpix::new(nside).unwrap();

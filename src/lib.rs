@@ -24,21 +24,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A field of any file that longan reads, whatever its grid, comes from [`formats::read`]:
-//!
-//! ```no_run
-//! use longan::formats::{self, At, Place, Selection};
-//!
-//! let level = At { dimension: "level".to_owned(), place: Place::Value("500".to_owned()) };
-//! let map = formats::read("era5.nc".as_ref(), &Selection { at: vec![level], nside: Some(64), ..Selection::default() })?;
-//! # Ok::<(), formats::Error>(())
-//! ```
-//!
-//! Where it has several times, [`formats::open`] gives one map after the other.
-//!
-//! The way of a field: [`formats`] → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
+//! The way of a field: [`Map`] → [`contour`] in the [`cells`] of the dual grid → [`moments`] at
 //! pixels, by [`transport`] → moments of [`window`]s, or [`totals`] → [`measures`] → output.
-//! [`Analysis`] brings these together. No module here prints or knows a path.
+//! [`Analysis`] brings these together. No module here prints or knows a file or a
+//! picture.
 //!
 //! Angles are in degrees in [`Analysis`], [`simulate`] and the measures, in radians below; lengths and areas on the
 //! unit sphere, in radians and steradian.
@@ -48,9 +37,9 @@ mod angles;
 pub mod cells;
 pub mod compare;
 pub mod contour;
+mod contour_lines;
 pub mod gaussian;
 pub mod moments;
-pub mod picture;
 pub mod region;
 pub mod simulate;
 pub mod smoothing;
@@ -62,8 +51,9 @@ pub mod window;
 
 pub use analysis::{Analysis, AnalysisError, DEFAULT_NSIDE_OUT, MinkowskiMaps, ThresholdUnit};
 pub use contour::Body;
-pub use longan_formats as formats;
-pub use longan_formats::{Healpix, Map};
+pub use contour_lines::contour_lines;
+pub use longan_grid as grid;
+pub use longan_grid::{Healpix, Map};
 pub use longan_measures as measures;
 pub use moments::Weight;
 pub use region::Region;

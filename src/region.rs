@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::str::FromStr;
 
-use longan_formats::Healpix;
+use longan_grid::Healpix;
 
 /// A point on the edge belongs to the region; distances in radians within this are the same.
 const EDGE: f64 = 1e-12;

@@ -7,7 +7,7 @@
 mod shapes;
 mod waves;
 
-use longan_formats::{Healpix, Map, Ring};
+use longan_grid::{Healpix, Map, Ring};
 use rayon::prelude::*;
 
 pub use shapes::{Body, Edge, Shape, scene, shapes};

@@ -7,7 +7,7 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use longan_formats::{Healpix, Ring};
+use longan_grid::{Healpix, Ring};
 use rayon::prelude::*;
 
 use crate::window::reach::OutputRing;

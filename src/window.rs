@@ -14,7 +14,7 @@ use std::convert::Infallible;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
-use longan_formats::{Healpix, Ring};
+use longan_grid::{Healpix, Ring};
 use num_complex::Complex64;
 use rayon::prelude::*;
 

@@ -8,7 +8,7 @@ use longan::totals::{Totals, totals, totals_within};
 use longan::window::Summation;
 use longan::{Analysis, Body, Healpix, Map, Region, ThresholdUnit, Thresholds};
 
-use super::{difference, masked, noise};
+use longan_support::{difference, masked, noise};
 
 #[test]
 fn a_threshold_among_many_is_as_it_is_alone() {

@@ -6,7 +6,7 @@ use longan::totals::{Totals, totals};
 use longan::window::{MovingWindows, Summation};
 use longan::{Analysis, Body, Healpix, Map, ThresholdUnit, Thresholds};
 
-use super::{difference, masked, noise, turned};
+use longan_support::{difference, masked, noise, turned};
 
 const NSIDES: [usize; 9] = [1, 2, 3, 4, 5, 8, 13, 16, 64];
 

@@ -1,11 +1,9 @@
-use std::path::PathBuf;
-
-use longan::formats::{self, Selection};
 use longan::measures::{BUILT_INS, BuiltIn, Formula, Measure};
 use longan::simulate::Waves;
 use longan::{Analysis, Healpix, Map, ThresholdUnit, Weight};
+use longan_formats::{self as formats, Selection};
 
-use super::{masked, skipped};
+use longan_support::masked;
 
 /// Every built-in measure that is neither a direction nor tells of the mask itself, with ranks 1 to 4 of families.
 fn measures() -> Vec<BuiltIn> {
@@ -85,9 +83,7 @@ fn every_measure_of_masked_windows_is_that_of_whole_ones() {
 
 #[test]
 fn every_measure_of_the_masked_shared_sky_is_that_of_the_whole() {
-    let Some(shared) = std::env::var_os("LONGAN_SHARED").map(PathBuf::from) else {
-        return skipped("LONGAN_SHARED is not set, so the masked sky there is not measured");
-    };
+    let Some(shared) = longan_support::shared() else { return };
     let read = |name: &str| formats::read(&shared.join("cases").join(name), &Selection::default()).unwrap();
     let sky = read("sky64.fits");
     let mut with_holes = sky.clone();

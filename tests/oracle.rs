@@ -278,7 +278,7 @@ fn compare(case: &Case<'_>, output: usize, radius: f64) -> f64 {
 }
 
 fn values(depth: u8, kind: u8, seed: u64) -> Vec<f64> {
-    let map = super::noise(1 << depth, [2, 4, 1000, 1_000_000][kind as usize % 4], seed);
+    let map = longan_support::noise(1 << depth, [2, 4, 1000, 1_000_000][kind as usize % 4], seed);
     map.values().to_vec()
 }
 
@@ -342,6 +342,6 @@ fn single_pixels_agree() {
             .remove(0)
             .columns
         };
-        assert!(super::difference(&of(0.0).concat(), &of(1e-3).concat()) < 1e-14);
+        assert!(longan_support::difference(&of(0.0).concat(), &of(1e-3).concat()) < 1e-14);
     }
 }

@@ -1,27 +1,18 @@
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use longan::contour::Field;
-use longan::formats::{self, Selection};
 use longan::measures::{BuiltIn, find};
 use longan::moments::{Selection as Moments, Weight};
 use longan::totals::totals as totals_of;
 use longan::window::{MovingWindows, Summation};
 use longan::{Analysis, Body, Healpix, Map, ThresholdUnit, Thresholds};
+use longan_formats::{self as formats, Selection};
 
-use super::skipped;
+use longan_support::shared;
 
 /// Relative to a column's largest value.
 const TOLERANCE: f64 = 1e-9;
-
-/// The folder of data and references, if there is one.
-fn shared() -> Option<PathBuf> {
-    let folder = std::env::var_os("LONGAN_SHARED").map(PathBuf::from);
-    if folder.is_none() {
-        skipped("LONGAN_SHARED is not set, so the reference values are not compared");
-    }
-    folder
-}
 
 struct Table {
     thresholds: Option<Vec<f64>>,
@@ -271,6 +262,6 @@ fn layouts_of_one_sky_agree() {
     let (ring, nested) = (run("grf_nside128_ring_f64.fits"), run("grf_nside128_nested_f32.fits.gz"));
     for (a, b) in ring.iter().zip(&nested) {
         // The precision of single-precision input.
-        assert!(super::difference(a, b) < 2e-4, "{}", super::difference(a, b));
+        assert!(longan_support::difference(a, b) < 2e-4, "{}", longan_support::difference(a, b));
     }
 }

@@ -5,7 +5,7 @@ use longan::moments::{Selection, Weight};
 use longan::window::{MovingWindows, Summation, Ways};
 use longan::{Body, Healpix, Map, Thresholds};
 
-use super::{masked, noise};
+use longan_support::{masked, noise};
 
 const RANKS: u32 = 8;
 
@@ -123,7 +123,7 @@ fn curvature_weighs_as_well() {
     // Each of the two thresholds turns by less than 2π in every cell.
     let most = exact[2].iter().copied().fold(0.0, f64::max) * 32.0 * 2.0;
     for (exact, fast) in exact[4..].iter().zip(&fast[4..]) {
-        assert!(super::difference(exact, fast) < 1e-7 * most);
+        assert!(longan_support::difference(exact, fast) < 1e-7 * most);
     }
 }
 
@@ -137,7 +137,7 @@ fn what_misses_the_tolerance_is_summed_directly() {
     assert!(ways.missed > 0 && ways.error <= 1e-12, "{ways:?}");
     let longest = exact[2].iter().copied().fold(0.0, f64::max);
     for (exact, fast) in exact.iter().zip(&fast) {
-        assert!(super::difference(exact, fast) < 1e-11 * longest);
+        assert!(longan_support::difference(exact, fast) < 1e-11 * longest);
     }
 }
 

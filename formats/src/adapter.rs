@@ -14,11 +14,12 @@ use flate2::read::MultiGzDecoder;
 
 use crate::csv::PointsCsv;
 use crate::healpix_fits::HealpixFits;
-use crate::map::{Sphere, Time};
 use crate::netcdf::Netcdf;
 use crate::ply::SurfacePly;
 use crate::zarr::{self, ZarrStore};
-use crate::{Card, CardValue, CoordinateSystem, Error, Healpix, Map, Ordering, Regridded};
+use crate::{Card, CardValue, Error};
+use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Regrid, Regridded};
+use longan_grid::{Sphere, Time};
 
 /// The field of a file that is to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,58 +83,6 @@ pub enum Place {
     Value(String),
     /// By its number from 0.
     Index(usize),
-}
-
-/// How fields on other grids, or at points, are brought to HEALPix.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Regrid {
-    /// From grids of longitude and latitude; unless given, [`Method::Bilinear`] where pixels are finer than the grid by
-    /// more than [`FINER`](crate::FINER), and [`Method::Conservative`] where they are not.
-    pub method: Option<Method>,
-    /// Pixels with a smaller share of valid values than this are masked.
-    pub min_valid: f64,
-    /// From points; unless given, [`Gather::Gaussian`] of twice the typical distance between points where pixels are finer
-    /// than that by more than [`FINER`](crate::FINER), and [`Gather::Mean`] where they are not.
-    pub gather: Option<Gather>,
-    /// Pixels whose centre is farther than this from any point, in degrees, are masked; unless given, twice the typical
-    /// distance between points, which is the median distance to the fourth nearest neighbour (coincident points count
-    /// once).
-    pub reach: Option<f64>,
-    /// The point from which a surface, or points in space, are seen; the mean of its vertices, or of them, unless given.
-    pub centre: Option<[f64; 3]>,
-    /// Whether, where a ray from the centre crosses a surface more than once, the outermost crossing counts.
-    pub allow_folds: bool,
-}
-
-impl Default for Regrid {
-    fn default() -> Self {
-        Regrid { method: None, min_valid: 0.5, gather: None, reach: None, centre: None, allow_folds: false }
-    }
-}
-
-/// How a field on a grid of longitude and latitude is brought to HEALPix.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// The mean over the pixel, from the areas that grid cells and pixel share.
-    Conservative,
-    /// Interpolated between the four grid points about the pixel's centre.
-    Bilinear,
-    /// The grid point nearest to the pixel's centre.
-    Nearest,
-}
-
-/// How values at points make a map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Gather {
-    /// The mean of the points in a pixel; the nearest point where there is none.
-    Mean,
-    /// The mean of all points, weighted by a Gaussian of this full width at half maximum in degrees.
-    Gaussian {
-        /// The width.
-        fwhm: f64,
-    },
-    /// The nearest point.
-    Nearest,
 }
 
 /// What maps take, as it shows before one is read.

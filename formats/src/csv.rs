@@ -2,19 +2,17 @@
 //!
 //! A header names the columns; those that say where a point is are known by their names. Cells are parted by commas,
 //! semicolons or tabs, whichever part the header. Lines that begin with # are comments; the last one before the numbers
-//! may be the header. How values at points become a map is left to [`crate::points`].
+//! may be the header. How values at points become a map is left to [`longan_grid::Points`].
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::columns::{self, Column, shown};
-use crate::directions::{self, FARTHEST, at, from_centre};
-use crate::points::Samples;
-use crate::{
-    About, Adapter, CoordinateSystem, Description, Error, Map, Maps, Regrid, Regridded, Room, Selection, Sphere, Time,
-    UNSEEN, is_bad,
-};
+use crate::{About, Adapter, Description, Error, GridDescription, Maps, Room, Selection};
+use longan_grid::directions::{self, FARTHEST, at, from_centre};
+use longan_grid::{CoordinateSystem, Map, Regrid, Regridded, Sphere, Time, UNSEEN, is_bad};
+use longan_grid::{Points, PointsSummary};
 
 /// What may part cells.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
@@ -62,7 +60,10 @@ impl Adapter for PointsCsv {
         let table = Table::open(path)?;
         // All points are counted, whatever values they have.
         let samples = table.samples(table.header.position.columns()[0], None)?;
-        Ok(columns::describe(self.name(), samples.describe(table.header.system)?, &table.header.columns))
+        let PointsSummary { spacing, nside, covered } = samples.summary()?;
+        let (points, coordinates) = (samples.values.len(), table.header.system);
+        let grid = GridDescription::Points { points, coordinates, spacing, nside, covered };
+        Ok(columns::describe(self.name(), grid, &table.header.columns))
     }
 
     fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
@@ -79,7 +80,7 @@ struct One {
     table: Table,
     /// The column of values.
     values: usize,
-    samples: Samples,
+    samples: Points,
     nside: Option<usize>,
     regrid: Regrid,
 }
@@ -90,7 +91,7 @@ impl Maps for One {
     }
 
     fn regridded(&self) -> Result<Option<Regridded>, Error> {
-        Ok(Some(self.samples.plan(self.nside, &self.regrid)?.regridded))
+        Ok(Some(self.samples.regridded(self.nside, &self.regrid)?))
     }
 
     fn about(&self) -> About {
@@ -110,7 +111,7 @@ impl Maps for One {
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
-        let mut map = self.samples.gather(self.nside, &self.regrid)?;
+        let mut map = self.samples.regrid(self.nside, &self.regrid)?;
         self.about().label(&mut map);
         Ok(map)
     }
@@ -343,7 +344,7 @@ impl Table {
     }
 
     /// The points that have a value in a column.
-    fn samples(&self, values: usize, centre: Option<[f64; 3]>) -> Result<Samples, Error> {
+    fn samples(&self, values: usize, centre: Option<[f64; 3]>) -> Result<Points, Error> {
         let mut points = self.points(values)?;
         // Points without a value count for the centre, which so is the same for all columns.
         let centre = match self.header.position {
@@ -354,10 +355,10 @@ impl Table {
         if points.is_empty() {
             return Err(Error::NoValues { column: shown(&self.header.columns[values].name) });
         }
-        let mut samples = Samples { directions: Vec::new(), values: Vec::new() };
+        let mut samples = Points { directions: Vec::new(), values: Vec::new() };
         for (point, value, at) in points {
             let Some((direction, _)) = from_centre(point, centre) else {
-                return Err(Error::AtCentre { place: self.place(at)? });
+                return Err(longan_grid::Error::AtCentre { place: self.place(at)? }.into());
             };
             samples.directions.push(direction);
             samples.values.push(value);

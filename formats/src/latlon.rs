@@ -8,11 +8,9 @@ use std::rc::Rc;
 use crate::cf::{self, Horizontal};
 use crate::dataset::{Dataset, Kind, Variable};
 use crate::names::is_alike;
-use crate::regridded;
-use crate::{
-    About, AxisDescription, Error, Field, GridDescription, Healpix, LatLon, Map, Maps, Method, Regridded, Room,
-    Selection, Sphere, TableDescription, Time, Weights,
-};
+use crate::{About, AxisDescription, Error, Field, GridDescription, Maps, Room, Selection, TableDescription};
+use longan_grid::regridded;
+use longan_grid::{Healpix, LatLon, Map, Method, Regridded, Sphere, Time, Weights};
 
 /// Lists name at most this many variables.
 const LISTED: usize = 24;
@@ -143,7 +141,7 @@ fn grid(dataset: &dyn Dataset, horizontal: &Horizontal) -> Result<(LatLon, Vec<f
         let whole = |v: &Variable| v.dimensions.iter().map(|d| 0..d.len).collect::<Vec<_>>();
         let bounds = coordinate.text("bounds").and_then(|name| cf::find(dataset, &coordinate.group, name.trim()));
         let bounds = bounds.map(|bounds| cf::values(dataset, bounds, &whole(bounds))).transpose()?;
-        Ok((cf::values(dataset, coordinate, &whole(coordinate))?, bounds))
+        Ok::<_, Error>((cf::values(dataset, coordinate, &whole(coordinate))?, bounds))
     };
     let (latitudes, latitude_bounds) = coordinate(horizontal.latitudes)?;
     let (longitudes, longitude_bounds) = coordinate(horizontal.longitudes)?;

@@ -7,8 +7,9 @@
 
 use rayon::prelude::*;
 
-use crate::canvas::{CHUNK, Canvas};
-use crate::{Error, Healpix, Ordering};
+use crate::Error;
+use longan_grid::accumulate::{Accumulator, CHUNK};
+use longan_grid::{Healpix, Ordering};
 
 /// The finest order of HEALPix, and so of UNIQ numbers.
 const ORDER_MAX: u32 = 29;
@@ -29,6 +30,12 @@ pub(crate) enum Problem {
 impl From<Error> for Problem {
     fn from(error: Error) -> Self {
         Problem::Other(error)
+    }
+}
+
+impl From<longan_grid::Error> for Problem {
+    fn from(error: longan_grid::Error) -> Self {
+        Problem::Other(error.into())
     }
 }
 
@@ -82,7 +89,7 @@ pub(crate) fn place_of_zuniq(zuniq: i128) -> Option<u64> {
 ///
 /// A pixel gets the mean over the cells in it, weighted by their area and without those that are masked; a pixel
 /// within a cell gets the cell's value.
-pub(crate) fn gather(mut cells: Vec<Cell>, nside: Option<usize>) -> Result<Canvas, Problem> {
+pub(crate) fn gather(mut cells: Vec<Cell>, nside: Option<usize>) -> Result<Accumulator, Problem> {
     cells.par_sort_unstable_by_key(|cell| cell.place);
     for pair in cells.windows(2) {
         if pair[0].span().1 > pair[1].span().0 {
@@ -97,7 +104,7 @@ pub(crate) fn gather(mut cells: Vec<Cell>, nside: Option<usize>) -> Result<Canva
         None => Healpix::new(finest)?,
     };
     let depth = u32::from(grid.depth()?);
-    let mut canvas = Canvas::new(grid, Ordering::Nested)?;
+    let mut canvas = Accumulator::new(grid, Ordering::Nested)?;
     let mut batch = Batch { canvas: &mut canvas, places: Vec::with_capacity(CHUNK), values: Vec::with_capacity(CHUNK) };
     let mut mean = Mean { pixel: 0, first: 0.0, sum: 0.0, weight: 0.0 };
     for cell in &cells {
@@ -152,7 +159,7 @@ impl Mean {
 
 /// Pixels that are put onto the canvas together.
 struct Batch<'a> {
-    canvas: &'a mut Canvas,
+    canvas: &'a mut Accumulator,
     places: Vec<u64>,
     values: Vec<f64>,
 }

@@ -10,9 +10,10 @@ use std::path::Path;
 use netcdf::{AttributeValue, Extent, FileMut, NcTypeDescriptor, VariableMut};
 use rayon::prelude::*;
 
-use crate::canvas::CHUNK;
 use crate::libnetcdf;
-use crate::{Card, CardValue, Error, Healpix, Ordering, Time};
+use crate::{Card, CardValue, Error};
+use longan_grid::accumulate::CHUNK;
+use longan_grid::{Healpix, Ordering, Time};
 
 /// What the steps of a file have in common.
 #[derive(Clone, Debug)]

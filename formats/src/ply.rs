@@ -8,9 +8,10 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use crate::columns::{self, Column, shown};
-use crate::directions::FARTHEST;
-use crate::surface::Surface;
-use crate::{About, Adapter, Description, Error, Map, Maps, Regrid, Room, Selection, Sphere, Time, UNSEEN, is_bad};
+use crate::{About, Adapter, Description, Error, GridDescription, Maps, Room, Selection};
+use longan_grid::directions::FARTHEST;
+use longan_grid::{Map, Regrid, Sphere, Time, UNSEEN, is_bad};
+use longan_grid::{Surface, SurfaceSummary};
 
 /// No line of a header is longer than this, and no number in a text.
 const LONGEST: u64 = 1 << 16;
@@ -69,7 +70,10 @@ impl Adapter for SurfacePly {
         let columns = header.columns()?;
         // A surface is the same whatever values it has.
         let surface = header.surface(input, "x")?;
-        Ok(columns::describe(self.name(), surface.describe()?, &columns))
+        let SurfaceSummary { centre, nside, covered, folded } = surface.summary()?;
+        let (vertices, triangles) = (surface.vertices.len(), surface.triangles.len());
+        let grid = GridDescription::Surface { vertices, triangles, centre, nside, covered, folded };
+        Ok(columns::describe(self.name(), grid, &columns))
     }
 
     fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
@@ -106,7 +110,7 @@ impl Maps for One {
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
-        let mut map = self.surface.map(self.nside, &self.regrid)?;
+        let mut map = self.surface.regrid(self.nside, &self.regrid)?;
         self.about().label(&mut map);
         Ok(map)
     }

@@ -1,7 +1,6 @@
 //! Plugins, good and broken ones, compiled from C.
 
-#[path = "plugins/compile.rs"]
-mod compile;
+use longan_support::compile;
 
 use std::path::{Path, PathBuf};
 

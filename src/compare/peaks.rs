@@ -1,6 +1,6 @@
 //! The places of a map that deviate most, each apart from all others.
 
-use longan_formats::Healpix;
+use longan_grid::Healpix;
 
 /// A pixel that deviates more than all about it.
 #[derive(Clone, Copy, Debug, PartialEq)]

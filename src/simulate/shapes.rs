@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec3, dvec3};
-use longan_formats::{Healpix, Map};
+use longan_grid::{Healpix, Map};
 
 use super::Error;
 

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use longan_formats::{Healpix, Map, Ring};
+use longan_grid::{Healpix, Map, Ring};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};

@@ -680,7 +680,7 @@ fn turn_sets_back<const K: usize, const SET: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use longan_formats::Healpix;
+    use longan_grid::Healpix;
 
     /// Fits are judged by what they give, whatever they were meant to fit.
     #[test]

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use longan_formats::{Healpix, Ring};
+use longan_grid::{Healpix, Ring};
 
 use crate::transport::RingTransport;
 

@@ -11,8 +11,8 @@ use super::unpack::values;
 use crate::Error;
 use crate::adapter::{At, Place};
 use crate::dataset::{Array, Dataset, Dimension, Kind, Variable};
-use crate::map::Time;
 use crate::names::is_alike;
+use longan_grid::Time;
 
 /// A number names a coordinate value within this part of it, so that 0.1 finds 0.1 in single precision.
 const VALUE_TOLERANCE: f64 = 1e-6;

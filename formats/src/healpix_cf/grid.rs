@@ -6,7 +6,8 @@
 //! the numbers are is left to [`super::read`].
 
 use crate::dataset::{Attribute, Dataset, Kind, Variable};
-use crate::{Error, Healpix, Ordering, cf};
+use crate::{Error, cf};
+use longan_grid::{Healpix, Ordering};
 
 /// Names that dimensions of cells have in files without an index coordinate.
 const CELL_DIMENSIONS: [&str; 8] = ["cell", "cells", "value", "values", "healpix_index", "cell_ids", "pixel", "pix"];
@@ -88,7 +89,7 @@ impl Says {
         if let Some(level) = self.level.as_ref().filter(|level| !is_none(&level.1)) {
             let number = whole(&level.1).filter(|number| (0..=LEVEL_MAX).contains(number));
             let number = number.ok_or_else(|| self.wrong(level, "a whole number from 0 to 29"))?;
-            return Healpix::new(1 << number).map(Some);
+            return Ok(Some(Healpix::new(1 << number)?));
         }
         let Some(nside) = &self.nside else { return Ok(None) };
         let number = whole(&nside.1).and_then(|number| Healpix::new(usize::try_from(number).ok()?).ok());

@@ -7,13 +7,11 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use super::grid::{Grid, Scheme};
-use crate::canvas::{CHUNK, Canvas};
 use crate::dataset::{Array, Attribute, Dataset, Variable};
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
-use crate::{
-    About, CoordinateSystem, Error, GridDescription, Healpix, Indexing, Map, Maps, Ordering, Room, Selection, Sphere,
-    Time, UNSEEN, cf, is_bad,
-};
+use crate::{About, Error, GridDescription, Indexing, Maps, Room, Selection, cf};
+use longan_grid::accumulate::{Accumulator, CHUNK};
+use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Sphere, Time, UNSEEN, is_bad};
 
 /// Finds what is selected of a field.
 pub(super) fn open(dataset: &Rc<dyn Dataset>, variable: usize, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
@@ -106,10 +104,10 @@ impl Maps for Field {
         });
         let (canvas, ordering) = match &self.cells {
             Cells::All(healpix, Ordering::Ring) => {
-                (Canvas { grid: *healpix, ordering: Ordering::Ring, values }, Ordering::Ring)
+                (Accumulator { grid: *healpix, ordering: Ordering::Ring, values }, Ordering::Ring)
             }
             Cells::All(healpix, ordering) => {
-                let mut canvas = Canvas::new(*healpix, *ordering)?;
+                let mut canvas = Accumulator::new(*healpix, *ordering)?;
                 let mut places = Vec::new();
                 for (start, values) in (0..).step_by(CHUNK).zip(values.chunks(CHUNK)) {
                     places.clear();
@@ -119,7 +117,7 @@ impl Maps for Field {
                 (canvas, *ordering)
             }
             Cells::Some(healpix, ordering, places) => {
-                let mut canvas = Canvas::new(*healpix, Ordering::Ring)?;
+                let mut canvas = Accumulator::new(*healpix, Ordering::Ring)?;
                 for (&place, &value) in places.iter().zip(&values) {
                     canvas.values[place as usize] = value;
                 }

@@ -18,7 +18,8 @@ use tempfile::NamedTempFile;
 
 use crate::adapter::{gunzipped_head, is_gzip};
 use crate::cfitsio::FitsReader;
-use crate::{About, Adapter, Description, Error, Healpix, Map, Maps, Room, Selection, Sphere, Time};
+use crate::{About, Adapter, Description, Error, Maps, Room, Selection};
+use longan_grid::{Healpix, Map, Sphere, Time};
 
 pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 

@@ -5,9 +5,9 @@
 use super::read::{read_integers, read_values};
 use super::table::{Column, Table};
 use crate::Error;
-use crate::canvas::{CHUNK, Canvas};
 use crate::cfitsio::FitsReader;
 use crate::multi_order::{Cell, Problem, gather, place_of_uniq};
+use longan_grid::accumulate::{Accumulator, CHUNK};
 
 /// Calls `each` with the place of every cell in chunks, in the table's order, and the number of the first of them.
 fn for_places(
@@ -49,7 +49,7 @@ pub(super) fn read(
     column: &Column,
     index: &Column,
     nside: Option<usize>,
-) -> Result<Canvas, Error> {
+) -> Result<Accumulator, Error> {
     let hdu = table.hdu;
     if table.run(column, index, 0)? != 1 {
         return Err(Error::Run {

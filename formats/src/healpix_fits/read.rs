@@ -4,9 +4,10 @@
 
 use super::multi_order;
 use super::table::{self, Column, Kind, Layout, Table};
-use crate::canvas::{CHUNK, Canvas};
 use crate::cfitsio::FitsReader;
-use crate::{Error, Field, Map, Ordering, Selection, UNSEEN, is_bad};
+use crate::{Error, Field, Selection};
+use longan_grid::accumulate::{Accumulator, CHUNK};
+use longan_grid::{Map, Ordering, UNSEEN, is_bad};
 
 /// Reads one field of a table.
 pub(super) fn read(fits: &mut FitsReader, table: &Table, column: &Column, selection: &Selection) -> Result<Map, Error> {
@@ -36,13 +37,13 @@ fn implicit(
     table: &Table,
     column: &Column,
     named: Option<(usize, usize)>,
-) -> Result<Canvas, Error> {
+) -> Result<Accumulator, Error> {
     let (grid, pixels) = table.implicit(column, named)?;
     let chunks = (0..pixels.len()).step_by(CHUNK).map(|start| (start, CHUNK.min(pixels.len() - start)));
     match table.ordering {
         Ordering::Ring => {
             // The map grows chunk by chunk, for each to be in the cache when it is filled.
-            let mut canvas = Canvas::reserved(grid, table.ordering)?;
+            let mut canvas = Accumulator::reserved(grid, table.ordering)?;
             canvas.values.resize(pixels.start, f64::NAN);
             for (start, count) in chunks {
                 let place = canvas.values.len();
@@ -53,7 +54,7 @@ fn implicit(
             Ok(canvas)
         }
         Ordering::Nested => {
-            let mut canvas = Canvas::new(grid, table.ordering)?;
+            let mut canvas = Accumulator::new(grid, table.ordering)?;
             let (mut values, mut places) = (Vec::new(), Vec::new());
             for (start, count) in chunks {
                 values.resize(count, 0.0);
@@ -74,11 +75,11 @@ fn explicit(
     column: &Column,
     (index, grain): (&Column, usize),
     plane: Option<usize>,
-) -> Result<Canvas, Error> {
+) -> Result<Accumulator, Error> {
     let grid = table.explicit_grid(index)?;
     let run = table.run(column, index, grain)?;
     let total = table.rows * index.repeat;
-    let mut canvas = Canvas::new(grid, table.ordering)?;
+    let mut canvas = Accumulator::new(grid, table.ordering)?;
     let mut seen = vec![0u64; grid.pixels().div_ceil(64)];
     let indices_per_chunk = (CHUNK / run).max(1);
     let (mut indices, mut values, mut places) = (Vec::new(), Vec::new(), Vec::new());

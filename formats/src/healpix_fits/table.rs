@@ -9,10 +9,8 @@ use std::ops::Range;
 use super::multi_order;
 use crate::cfitsio::FitsReader;
 use crate::names;
-use crate::{
-    Card, CardValue, CoordinateSystem, Error, Field, FieldDescription, GridDescription, Healpix, Indexing, Ordering,
-    TableDescription, TablePlace,
-};
+use crate::{Card, CardValue, Error, Field, FieldDescription, GridDescription, Indexing, TableDescription, TablePlace};
+use longan_grid::{CoordinateSystem, Healpix, Ordering};
 
 /// A HEALPix table.
 pub(super) struct Table {

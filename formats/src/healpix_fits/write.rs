@@ -10,9 +10,10 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
-use crate::canvas::CHUNK;
 use crate::cfitsio::FitsWriter;
-use crate::{CoordinateSystem, Error, Healpix, Ordering, UNSEEN, save};
+use crate::{Error, save};
+use longan_grid::accumulate::CHUNK;
+use longan_grid::{CoordinateSystem, Healpix, Ordering, UNSEEN};
 
 /// One entry of a header.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,7 +108,7 @@ const ROW: usize = 1024;
 ///
 /// # Errors
 /// [`Error::File`], which names the file, around the reason: [`Error::ColumnLength`], [`Error::CardKey`],
-/// [`Error::LongName`], [`Error::NotNested`], or those of [`save()`].
+/// [`Error::LongName`], [`Error::Grid`], or those of [`save()`].
 pub fn write_healpix(path: &Path, file: &HealpixFile, overwrite: bool) -> Result<(), Error> {
     let HealpixFile { grid, ordering, coordinates, float32, ref extensions } = *file;
     let layout = HealpixLayout { grid, ordering, coordinates, float32 };
@@ -127,7 +128,7 @@ impl HealpixWriter {
     /// where the path ends in `.gz`.
     ///
     /// # Errors
-    /// [`Error::NotNested`], or [`Error::CfitsioWrite`].
+    /// [`Error::Grid`], or [`Error::CfitsioWrite`].
     pub fn create(path: &Path, layout: HealpixLayout) -> Result<Self, Error> {
         layout.check()?;
         let compressed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));

@@ -1,6 +1,7 @@
 //! The same map, told in every way that files do.
 
-use longan_formats::{Indexing, Ordering, describe};
+use longan_formats::{Indexing, describe};
+use longan_grid::Ordering;
 use serde_json::{Value, json};
 
 use crate::file::{FORMATS, File, Format, Values, Variable, variable};

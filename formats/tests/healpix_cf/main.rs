@@ -10,7 +10,8 @@ mod zarr;
 
 use std::path::Path;
 
-use longan_formats::{Error, Field, Map, Selection};
+use longan_formats::{Error, Field, Selection};
+use longan_grid::Map;
 
 /// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
 const NEST_TO_RING_2: [usize; 48] = [

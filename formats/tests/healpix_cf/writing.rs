@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use longan_formats::*;
+use longan_grid::{Healpix, Ordering, Time};
 
 use crate::{assert_same, field, problem};
 

@@ -1,12 +1,12 @@
 //! Headers with keywords missing, misspelt, wrong or absurd.
 
 use longan_formats::{
-    Card, CardValue, Column, CoordinateSystem, Error, Extension, GridDescription, Healpix, HealpixFile, Ordering,
-    describe, write_healpix,
+    Card, CardValue, Column, Error, Extension, GridDescription, HealpixFile, describe, write_healpix,
 };
+use longan_grid::{CoordinateSystem, Healpix, Ordering};
 
-use crate::bytes::{Col, col, f64s, file, header, i64s, picture, primary, table};
 use crate::*;
+use longan_support::bytes::{Col, col, f64s, file, header, i64s, picture, primary, table};
 
 /// A full map of Nside 2 with these keywords.
 fn with_keys(keys: &[(&str, &str)]) -> Vec<u8> {
@@ -34,7 +34,10 @@ fn nside_is_inferred() {
     assert!(matches!(error, Error::NsideOfIndices { .. }) && told.contains("add NSIDE"), "{told}");
     let keys = [("ORDERING", "'NESTED'")];
     let bytes = file(108, &[col("T", "D", f64s(&[0.0; 108]))], &keys);
-    assert!(matches!(problem_with(&bytes, &Selection::default()).0, Error::NotNested { nside: 3 }));
+    assert!(matches!(
+        problem_with(&bytes, &Selection::default()).0,
+        Error::Grid(longan_grid::Error::NotNested { nside: 3 })
+    ));
 }
 
 #[test]
@@ -60,7 +63,7 @@ fn impossible_nsides() {
     // A grid that no memory holds, of which the file has two pixels.
     let columns = [col("PIXEL", "K", i64s(&[1, 2])), col("T", "D", f64s(&[1.0; 2]))];
     let (error, told) = problem_with(&file(2, &columns, &[("NSIDE", "536870912")]), &Selection::default());
-    assert!(matches!(error, Error::Memory { nside: 536870912, .. }), "{told}");
+    assert!(matches!(error, Error::Grid(longan_grid::Error::Memory { nside: 536870912, .. })), "{told}");
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Every layout in which a map can be stored gives the same map.
 
-use longan_formats::{CoordinateSystem, Error, GridDescription, Indexing, Ordering, TablePlace, UNSEEN, describe};
+use longan_formats::{Error, GridDescription, Indexing, TablePlace, describe};
+use longan_grid::{CoordinateSystem, Ordering, UNSEEN};
 
-use crate::bytes::{Col, col, f32s, f64s, file, gzip, i16s, i32s, i64s, primary, table};
 use crate::*;
+use longan_support::bytes::{Col, col, f32s, f64s, file, gzip, i16s, i32s, i64s, primary, table};
 
 const RING: &[(&str, &str)] = &[("PIXTYPE", "'HEALPIX'"), ("ORDERING", "'RING'"), ("NSIDE", "2")];
 const NESTED: &[(&str, &str)] = &[("PIXTYPE", "'HEALPIX'"), ("ORDERING", "'NESTED'"), ("NSIDE", "2")];
@@ -49,7 +50,7 @@ fn any_nside_in_ring_order() {
     }
     let keys = [("ORDERING", "'NESTED'"), ("NSIDE", "3")];
     let (error, _) = problem_with(&file(108, &[col("T", "D", f64s(&[0.0; 108]))], &keys), &Selection::default());
-    assert!(matches!(error, Error::NotNested { nside: 3 }));
+    assert!(matches!(error, Error::Grid(longan_grid::Error::NotNested { nside: 3 })));
 }
 
 #[test]

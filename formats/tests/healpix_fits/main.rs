@@ -1,6 +1,5 @@
-//! HEALPix FITS files, read and written. Files to read are made byte by byte in [`bytes`], without the FITS library.
+//! HEALPix FITS files, read and written. Files to read are made byte by byte in [`longan_support::bytes`], without the FITS library.
 
-mod bytes;
 mod headers;
 mod layouts;
 mod multi_order;
@@ -11,7 +10,8 @@ mod writing;
 
 use std::path::PathBuf;
 
-use longan_formats::{Error, Field, Map, Selection};
+use longan_formats::{Error, Field, Selection};
+use longan_grid::Map;
 
 /// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
 const NEST_TO_RING_2: [usize; 48] = [
@@ -76,10 +76,4 @@ fn assert_same(found: &[f64], expected: &[f64]) {
     for (p, (f, e)) in found.iter().zip(expected).enumerate() {
         assert!(f == e || f.is_nan() && e.is_nan(), "pixel {p}: {f} instead of {e}");
     }
-}
-
-/// Says on the terminal, past the test runner's capture, that a test did not run.
-fn skipped(test: &str, why: &str) {
-    use std::io::Write;
-    std::io::stderr().write_all(format!("skipped {test}: {why}\n").as_bytes()).unwrap();
 }

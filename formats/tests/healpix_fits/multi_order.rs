@@ -2,8 +2,8 @@
 
 use longan_formats::{Error, GridDescription, Indexing, describe};
 
-use crate::bytes::{Col, col, f64s, file, i64s};
 use crate::*;
+use longan_support::bytes::{Col, col, f64s, file, i64s};
 
 fn uniq(order: u32, pixel: i64) -> i64 {
     4i64.pow(order + 1) + pixel
@@ -47,13 +47,13 @@ fn coarse_cells_are_copied_and_fine_ones_averaged() {
         (uniq(2, 8), 5.0),
         (uniq(2, 9), f64::NAN),
         // Nothing but a masked quarter of pixel 47.
-        (uniq(2, 191), longan_formats::UNSEEN),
+        (uniq(2, 191), longan_grid::UNSEEN),
     ]);
     let map = read_with(&bytes, &at(2)).unwrap();
     let mut expected = vec![(0, 1.0), (1, (20.0 + 10.0 + 30.0 + 3.0) / 4.0), (2, 5.0)];
     expected.extend((12..16).map(|p| (p, 7.0)));
     assert_same(map.values(), &nside_2(expected));
-    assert_eq!((map.name.as_str(), map.ordering), ("PROBDENSITY", longan_formats::Ordering::Nested));
+    assert_eq!((map.name.as_str(), map.ordering), ("PROBDENSITY", longan_grid::Ordering::Nested));
 
     // At Nside 1 everything is averaged by its area: the quarters weigh a quarter of pixel 0 of order 1.
     let map = read_with(&bytes, &at(1)).unwrap();
@@ -89,7 +89,7 @@ fn fine_cells_need_no_fine_grid() {
     let (error, told) = problem_with(&bytes, &Selection::default());
     assert!(matches!(error, Error::TooFine { finest: 536870912, limit: 8192, .. }));
     assert!(told.contains("--nside"), "{told}");
-    assert!(matches!(problem_with(&bytes, &at(1 << 29)).0, Error::Memory { .. }));
+    assert!(matches!(problem_with(&bytes, &at(1 << 29)).0, Error::Grid(longan_grid::Error::Memory { .. })));
     for nside in [0, 3, 100, 1 << 30] {
         assert!(matches!(problem_with(&bytes, &at(nside)).0, Error::Resolution { nside: n } if n == nside));
     }

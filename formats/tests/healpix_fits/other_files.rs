@@ -4,8 +4,9 @@ use std::path::Path;
 
 use longan_formats::{Error, describe};
 
-use crate::bytes::{col, f64s, file, gzip};
 use crate::*;
+use longan_support::bytes::{col, f64s, file, gzip};
+use longan_support::skip;
 
 fn map() -> Vec<u8> {
     file(48, &[col("T", "D", f64s(&nested_values()))], &[("NSIDE", "2"), ("ORDERING", "'NESTED'")])
@@ -113,7 +114,7 @@ fn a_file_that_may_not_be_read() {
     let file = scratch(&map());
     std::fs::set_permissions(&file.path, std::fs::Permissions::from_mode(0o000)).unwrap();
     if std::fs::File::open(&file.path).is_ok() {
-        return skipped("a_file_that_may_not_be_read", "this user may read everything");
+        return skip("permissions", "this user may read everything, so a locked file is not tested");
     }
     let (error, told) = problem(longan_formats::read(&file.path, &Selection::default()));
     assert!(matches!(error, Error::Io { action: "open it", .. }), "{told}");

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use longan_formats::{Error, Healpix, HealpixFile, Ordering, write_healpix};
+use longan_formats::{Error, HealpixFile, write_healpix};
+use longan_grid::{Healpix, Ordering};
 
-use crate::bytes::{col, f64s, file, gzip};
 use crate::*;
+use longan_support::bytes::{col, f64s, file, gzip};
 
 fn map(value: f64) -> Vec<u8> {
     file(12, &[col("T", "D", f64s(&[value; 12]))], &[("NSIDE", "1")])

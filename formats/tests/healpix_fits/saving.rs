@@ -5,7 +5,9 @@ use std::path::Path;
 
 use longan_formats::{Error, check_writable, save};
 
-use crate::{problem, skipped};
+use longan_support::skip;
+
+use crate::problem;
 
 fn write_text(text: &'static str) -> impl FnOnce(&Path) -> Result<(), Error> {
     move |path| {
@@ -133,7 +135,7 @@ fn a_folder_that_may_not_be_written_to() {
     let folder = tempfile::tempdir().unwrap();
     fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o555)).unwrap();
     if fs::write(folder.path().join("probe"), "").is_ok() {
-        return skipped("a_folder_that_may_not_be_written_to", "this user may write everywhere");
+        return skip("permissions", "this user may write everywhere, so a locked folder is not tested");
     }
     let (error, told) = problem(check_writable(&folder.path().join("out.fits"), false));
     assert!(matches!(error, Error::Io { action: "write to its folder", .. }), "{told}");

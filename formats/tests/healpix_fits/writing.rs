@@ -6,7 +6,9 @@ use std::process::Command;
 
 use longan_formats::*;
 
-use crate::{assert_same, problem, skipped};
+use longan_grid::{CoordinateSystem, Healpix, Ordering};
+
+use crate::{assert_same, problem};
 
 fn value(scale: f64, pixel: usize) -> f64 {
     if pixel % 7 == 3 { f64::NAN } else { scale * pixel as f64 }
@@ -239,7 +241,10 @@ fn what_cannot_be_written() {
         change(&mut file);
         problem(write_healpix(&path, &file, false)).0
     };
-    assert!(matches!(error_of(&|f| f.ordering = Ordering::Nested), Error::NotNested { nside: 3 }));
+    assert!(matches!(
+        error_of(&|f| f.ordering = Ordering::Nested),
+        Error::Grid(longan_grid::Error::NotNested { nside: 3 })
+    ));
     let short = error_of(&|f| f.extensions[1].columns[0].values.truncate(7));
     assert!(matches!(short, Error::ColumnLength { found: 7, nside: 3, expected: 108, .. }));
     for key in ["", "lower", "NINE_LONG", "SP ACE", "GRÖSSE", "A\n"] {
@@ -257,21 +262,20 @@ fn what_cannot_be_written() {
     assert_eq!(fs::read_to_string(&path).unwrap(), "old");
 }
 
-/// Whether a program can be run.
-fn runs(command: &mut Command) -> bool {
-    command.output().is_ok_and(|output| output.status.success())
+/// Runs a script.
+fn run(python: &str, script: &str) {
+    let output = Command::new(python).arg("-c").arg(script).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
 fn fitsverify_has_nothing_to_say() {
     let folder = tempfile::tempdir().unwrap();
-    if Command::new("fitsverify").output().is_err() {
-        return skipped("fitsverify_has_nothing_to_say", "there is no fitsverify");
-    }
+    let Some(fitsverify) = longan_support::fitsverify() else { return };
     for (name, file) in files() {
         let path = folder.path().join(&name);
         write_healpix(&path, &file, false).unwrap();
-        let output = Command::new("fitsverify").arg("-q").arg(&path).output().unwrap();
+        let output = Command::new(fitsverify).arg("-q").arg(&path).output().unwrap();
         let said = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success() && said.starts_with("verification OK"), "{said}");
     }
@@ -279,9 +283,7 @@ fn fitsverify_has_nothing_to_say() {
 
 #[test]
 fn healpy_reads_the_same() {
-    if !runs(Command::new("python3").args(["-c", "import healpy"])) {
-        return skipped("healpy_reads_the_same", "there is no python3 with healpy");
-    }
+    let Some(python) = longan_support::python_with("healpy") else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut script = "import healpy, numpy, sys\n".to_owned();
     for (name, file) in files() {
@@ -304,9 +306,7 @@ fn healpy_reads_the_same() {
             );
         }
     }
-    script += "print('checked')\n";
-    let output = Command::new("python3").arg("-c").arg(script).output().unwrap();
-    assert!(output.stdout == b"checked\n", "{}", String::from_utf8_lossy(&output.stderr));
+    run(&python, &script);
 }
 
 #[test]
@@ -327,9 +327,8 @@ fn files_of_healpy_are_read() {
          \x20   numpy.save(f'{{int(nest)}}', 0)\n",
         folder.path()
     );
-    if !runs(Command::new("python3").arg("-c").arg(script)) {
-        return skipped("files_of_healpy_are_read", "there is no python3 with healpy");
-    }
+    let Some(python) = longan_support::python_with("healpy") else { return };
+    run(&python, &script);
     // healpy.write_map does not reorder: the values are in the order that the file names.
     let grid = Healpix::new(32).unwrap();
     let map: Vec<f64> = (0..grid.pixels()).map(|p| p as f64 * 0.25).collect();

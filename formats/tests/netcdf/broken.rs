@@ -117,11 +117,11 @@ fn coordinates_out_of_order_or_missing_values() {
     let Data::F64(latitudes) = &mut file.var("lat").data else { panic!() };
     latitudes.swap(3, 4);
     let (error, told) = told(&file);
-    assert!(matches!(error, Error::NotMonotonic { coordinate: "latitude", .. }), "{told}");
+    assert!(matches!(error, Error::Grid(longan_grid::Error::NotMonotonic { coordinate: "latitude", .. })), "{told}");
     let mut file = plain();
     let Data::F64(longitudes) = &mut file.var("lon").data else { panic!() };
     longitudes[7] = f64::NAN;
-    assert!(matches!(problem(read(&file.scratch().path)).0, Error::CoordinateRange { .. }));
+    assert!(matches!(problem(read(&file.scratch().path)).0, Error::Grid(longan_grid::Error::CoordinateRange { .. })));
     let mut file = plain();
     file.var("lat").data = Data::Text(vec!["x"; LATITUDES]);
     assert!(matches!(problem(read(&file.scratch().path)).0, Error::VariableKind { .. }));

@@ -2,7 +2,7 @@
 
 use netcdf::AttributeValue;
 
-use longan_formats::{Method, Regrid};
+use longan_grid::{Method, Regrid};
 
 use crate::inputs::Format;
 use crate::*;

@@ -10,7 +10,8 @@ mod selections;
 
 use std::path::Path;
 
-use longan_formats::{At, Error, Field, Map, Place, Selection};
+use longan_formats::{At, Error, Field, Place, Selection};
+use longan_grid::Map;
 
 use inputs::{Data, Nc, text, var};
 
@@ -91,10 +92,4 @@ fn assert_close(found: &[f64], expected: &[f64]) {
         let close = (f - e).abs() <= 1e-12 * e.abs();
         assert!(close || f.is_nan() && e.is_nan(), "pixel {p}: {f} instead of {e}");
     }
-}
-
-/// Says on the terminal, past the test runner's capture, that a test did not run.
-fn skipped(test: &str, why: &str) {
-    use std::io::Write;
-    std::io::stderr().write_all(format!("skipped {test}: {why}\n").as_bytes()).unwrap();
 }

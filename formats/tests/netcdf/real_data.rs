@@ -7,12 +7,8 @@ use longan_formats::{GridDescription, describe, open};
 use crate::*;
 
 /// A file of the folder that LONGAN_SHARED names.
-fn shared(test: &str, name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("LONGAN_SHARED");
-    if folder.is_none() {
-        skipped(test, "LONGAN_SHARED names no folder with the data");
-    }
-    folder.map(|folder| PathBuf::from(folder).join("data").join(name))
+fn shared(name: &str) -> Option<PathBuf> {
+    Some(longan_support::shared()?.join("data").join(name))
 }
 
 /// The values of the first step, and its date.
@@ -38,7 +34,7 @@ fn assert_near(found: &[f64], expected: &[f64]) {
 
 #[test]
 fn era_interim() {
-    let Some(path) = shared("era_interim", "eraint_uvz.nc") else { return };
+    let Some(path) = shared("eraint_uvz.nc") else { return };
     let selection = Selection { field: Some(Field::Name("z".into())), ..at(&["level=500", "month=1"]) };
     let (values, label) = first(&path, &selection);
     assert_eq!((values.len(), label), (241 * 480, None));
@@ -61,7 +57,7 @@ fn era_interim() {
 
 #[test]
 fn geopotential_height() {
-    let Some(path) = shared("geopotential_height", "hgt_djf.nc") else { return };
+    let Some(path) = shared("hgt_djf.nc") else { return };
     let mut maps = open(&path, &Selection::default()).unwrap();
     let labels: Vec<_> = maps.times().iter().map(|time| time.label.as_str()).collect();
     assert_eq!(labels.len(), 65);
@@ -75,7 +71,7 @@ fn geopotential_height() {
 
 #[test]
 fn sea_surface_temperature() {
-    let Some(path) = shared("sea_surface_temperature", "sst_ndjfm_anom.nc") else { return };
+    let Some(path) = shared("sst_ndjfm_anom.nc") else { return };
     let (values, label) = first(&path, &at(&["time=1998"]));
     assert_eq!(label.as_deref(), Some("1998-01-15T12:00"));
     assert_near(&summary(&values), &[-1.662470305992278, 4.315390855271295, 0.5152632464163469]);

@@ -66,13 +66,17 @@ fn centres_that_cannot_be() {
     for bad in [f64::NAN, f64::INFINITY, -1e300] {
         let regrid = Regrid { centre: Some([0.0, bad, 0.0]), ..Regrid::default() };
         for bytes in [b"x,y,z,v\n1,0,0,1\n0,1,0,2\n".to_vec(), sphere(1).ply()] {
-            assert!(matches!(problem_with(&bytes, &nside(4, regrid.clone())).0, Error::Setting { .. }));
+            assert!(matches!(
+                problem_with(&bytes, &nside(4, regrid.clone())).0,
+                Error::Grid(longan_grid::Error::Setting { .. })
+            ));
         }
     }
     let vertex = Regrid { centre: Some([0.0, 1.0, 0.0]), ..Regrid::default() };
     let (error, told) = problem_with(&sphere(1).ply(), &nside(4, vertex));
     assert!(
-        matches!(error, Error::AtCentre { .. }) && told.starts_with("vertex 1 (from 0) lies at the centre"),
+        matches!(error, Error::Grid(longan_grid::Error::AtCentre { .. }))
+            && told.starts_with("vertex 1 (from 0) lies at the centre"),
         "{told}"
     );
 }

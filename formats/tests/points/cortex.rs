@@ -26,9 +26,7 @@ fn quantiles(map: &Map) -> Vec<f64> {
 
 #[test]
 fn points_and_triangles_agree() {
-    let Some(folder) = std::env::var_os("LONGAN_SHARED").map(PathBuf::from) else {
-        return skipped("points_and_triangles_agree", "LONGAN_SHARED does not name the folder of shared data");
-    };
+    let Some(folder) = longan_support::shared() else { return };
     // A Gaussian as wide as the edges of triangles weighs points about as linear interpolation does.
     for (way, least, apart) in
         [(Gather::Mean, 0.99, 0.05), (Gather::Nearest, 0.99, 0.05), (Gather::Gaussian { fwhm: 2.0 }, 0.9995, 0.02)]
@@ -59,9 +57,7 @@ fn points_and_triangles_agree() {
 
 #[test]
 fn both_are_the_same_at_the_vertices() {
-    let Some(folder) = std::env::var_os("LONGAN_SHARED").map(PathBuf::from) else {
-        return skipped("both_are_the_same_at_the_vertices", "LONGAN_SHARED does not name the folder of shared data");
-    };
+    let Some(folder) = longan_support::shared() else { return };
     let (points, triangles) = both(&folder, Some(512), gather(Gather::Nearest));
     let table = std::fs::read_to_string(folder.join("data/cortex_fsaverage5_left.csv")).unwrap();
     let mut differences = Vec::new();

@@ -163,13 +163,19 @@ fn coincident_points() {
 #[test]
 fn one_place_needs_settings() {
     let text = "lon,lat,v\n10,20,1\n10,20,2\n";
-    assert!(matches!(problem_with(text.as_bytes(), &Selection::default()).0, Error::OnePlace));
+    assert!(matches!(
+        problem_with(text.as_bytes(), &Selection::default()).0,
+        Error::Grid(longan_grid::Error::OnePlace)
+    ));
     let reach = Regrid { reach: Some(30.0), ..Regrid::default() };
     assert!(matches!(
         problem_with(text.as_bytes(), &Selection { regrid: reach.clone(), ..Selection::default() }).0,
-        Error::OnePlace
+        Error::Grid(longan_grid::Error::OnePlace)
     ));
-    assert!(matches!(problem_with(text.as_bytes(), &nside(4, Regrid::default())).0, Error::OnePlace));
+    assert!(matches!(
+        problem_with(text.as_bytes(), &nside(4, Regrid::default())).0,
+        Error::Grid(longan_grid::Error::OnePlace)
+    ));
     let map = read_with(text.as_bytes(), &nside(16, reach)).unwrap();
     let covered = map.values().iter().filter(|v| v.is_finite()).count() as f64 / map.grid().pixels() as f64;
     assert!((covered - (1.0 - 30f64.to_radians().cos()) / 2.0).abs() < 0.01);
@@ -201,11 +207,20 @@ fn settings_that_cannot_be() {
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         for regrid in [Regrid { reach: Some(bad), ..Regrid::default() }, gather(Gather::Gaussian { fwhm: bad })] {
             let (error, told) = problem_with(text.as_bytes(), &nside(4, regrid));
-            assert!(matches!(error, Error::Setting { .. }) && told.contains(&bad.to_string()), "{told}");
+            assert!(
+                matches!(error, Error::Grid(longan_grid::Error::Setting { .. })) && told.contains(&bad.to_string()),
+                "{told}"
+            );
         }
     }
     for bad in [0, usize::MAX, 1 << 29] {
         let error = problem_with(text.as_bytes(), &nside(bad, Regrid::default())).0;
-        assert!(matches!(error, Error::Nside { .. } | Error::Memory { .. }), "{error}");
+        assert!(
+            matches!(
+                error,
+                Error::Grid(longan_grid::Error::Nside { .. }) | Error::Grid(longan_grid::Error::Memory { .. })
+            ),
+            "{error}"
+        );
     }
 }

@@ -10,7 +10,8 @@ mod tables;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use longan_formats::{Error, Gather, Healpix, Map, Regrid, Selection};
+use longan_formats::{Error, Selection};
+use longan_grid::{Gather, Healpix, Map, Regrid};
 
 /// A file in a folder of its own.
 struct Scratch {
@@ -124,10 +125,4 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     let c = cross(a, b);
     dot(c, c).sqrt().atan2(dot(a, b))
-}
-
-/// Says on the terminal, past the test runner's capture, that a test did not run.
-fn skipped(test: &str, why: &str) {
-    use std::io::Write;
-    std::io::stderr().write_all(format!("skipped {test}: {why}\n").as_bytes()).unwrap();
 }

@@ -373,9 +373,9 @@ fn the_centre_is_the_mean_of_the_vertices_unless_given() {
     }
     let outside = Regrid { centre: Some([3.0, 0.0, 0.0]), ..Regrid::default() };
     let (error, told) = problem_with(&mesh.ply(), &nside(16, outside));
-    let Error::Crossings { never, several } = error else { panic!("{told}") };
+    let Error::Grid(longan_grid::Error::Crossings { never, several }) = error else { panic!("{told}") };
     assert_eq!(never.pixels + several.pixels, never.of);
-    assert!(told.contains("--centre") && told.contains("--allow-folds"), "{told}");
+    assert!(told.contains("name a centre inside") && told.contains("allow folds"), "{told}");
 }
 
 /// Half a sphere.
@@ -393,13 +393,15 @@ fn folds_and_holes() {
     let folded = outer.clone().and(cap.clone());
     let folds = Regrid { allow_folds: true, ..centred() };
     for (mesh, never, several) in [(&folded, 0.0, 0.5), (&cap, 0.5, 0.0), (&outer, 0.0, 0.0)] {
-        let share = |percent: longan_formats::Percent| percent.pixels as f64 / percent.of as f64;
+        let share = |percent: longan_grid::Percent| percent.pixels as f64 / percent.of as f64;
         match longan_formats::read(&scratch(&mesh.ply()).path, &nside(16, centred())) {
             Ok(_) => assert_eq!(never + several, 0.0),
             Err(error) => {
                 let Error::File { problem, .. } = error else { panic!() };
                 let told = problem.to_string();
-                let Error::Crossings { never: n, several: s } = *problem else { panic!("{told}") };
+                let Error::Grid(longan_grid::Error::Crossings { never: n, several: s }) = *problem else {
+                    panic!("{told}")
+                };
                 assert!((share(n) - never).abs() < 0.02 && (share(s) - several).abs() < 0.02, "{told}");
                 assert!(told.contains(&n.to_string()) && told.contains(&s.to_string()), "{told}");
             }
@@ -418,14 +420,18 @@ fn folds_and_holes() {
 fn a_triangle_that_lies_twice_is_a_fold() {
     let mut mesh = sphere(1).moved(turned);
     mesh.faces.push(mesh.faces[5].clone());
-    let Error::Crossings { never, several } = problem_with(&mesh.ply(), &nside(32, centred())).0 else { panic!() };
+    let Error::Grid(longan_grid::Error::Crossings { never, several }) =
+        problem_with(&mesh.ply(), &nside(32, centred())).0
+    else {
+        panic!()
+    };
     assert_eq!(never.pixels, 0);
     assert!((several.pixels as f64 / several.of as f64 - 1.0 / 32.0).abs() < 0.02);
 }
 
 #[test]
 fn vertices_without_values_mask_their_triangles() {
-    for missing in [f64::NAN, f64::INFINITY, longan_formats::UNSEEN] {
+    for missing in [f64::NAN, f64::INFINITY, longan_grid::UNSEEN] {
         let mut mesh = sphere(3).moved(turned);
         for v in [0, 17, 80] {
             mesh.values[v] = missing;

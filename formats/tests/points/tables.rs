@@ -105,12 +105,12 @@ fn coordinate_systems_are_those_of_the_names() {
         read_with(text.as_bytes(), &Selection::default()).unwrap().coordinates
     };
     assert_eq!(system("lon,lat"), None);
-    assert_eq!(system("ra,dec"), Some(longan_formats::CoordinateSystem::Celestial));
-    assert_eq!(system("glon,glat"), Some(longan_formats::CoordinateSystem::Galactic));
+    assert_eq!(system("ra,dec"), Some(longan_grid::CoordinateSystem::Celestial));
+    assert_eq!(system("glon,glat"), Some(longan_grid::CoordinateSystem::Galactic));
     // Where there are several, the first kind counts and the others are no values.
     let both = "glon,glat,ra,dec,v\n1,2,10,20,1\n1,2,30,40,2\n";
     let map = read_with(both.as_bytes(), &Selection::default()).unwrap();
-    assert_eq!((map.coordinates, map.name.as_str()), (Some(longan_formats::CoordinateSystem::Celestial), "v"));
+    assert_eq!((map.coordinates, map.name.as_str()), (Some(longan_grid::CoordinateSystem::Celestial), "v"));
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn descriptions_say_what_there_is() {
     assert_eq!(fields, [("depth", Some("mm")), ("flux", None)]);
     let GridDescription::Points { points: count, coordinates, spacing, nside, covered } = table.grid else { panic!() };
     assert_eq!(count, points.len() + 1);
-    assert_eq!((coordinates, nside), (Some(longan_formats::CoordinateSystem::Celestial), Some(32)));
+    assert_eq!((coordinates, nside), (Some(longan_grid::CoordinateSystem::Celestial), Some(32)));
     assert!((spacing.unwrap() - 1.83).abs() < 0.2, "{spacing:?}");
     assert!((0.5..0.54).contains(&covered.unwrap()), "{covered:?}");
     // One place has no distances.

@@ -1,0 +1,498 @@
+//! `longan compare`: a Minkowski map of data against those of simulations.
+//!
+//! [`said`] reads headers and finds what does not go together, [`work`] makes Minkowski maps of raw maps, [`scatter`]
+//! looks at one pixel, [`report`] tells people and programs. The comparison itself is left to [`longan::compare`].
+
+mod report;
+mod said;
+mod scatter;
+mod work;
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use longan::ThresholdUnit;
+use longan::compare::{Ensemble, Rank, peaks};
+use longan::measures::Measure;
+use longan::smoothing::Smoothing;
+use longan_formats::{self as formats, Card, Error};
+use longan_grid::Healpix;
+
+use super::jobs::Jobs;
+use super::mapping::Mapping;
+use super::mismatch::Together;
+use super::misused;
+use super::options::{Format, Running, between, check_apart, check_memory, print, shown, whole};
+use super::output::{command, creator, integer, numbered, real, text};
+use super::progress::Progress;
+use super::sink::{self, Kind, MapColumn, Step, Table};
+use report::{OfMeasure, Region, Report};
+use said::{Column, Said};
+use scatter::{At, Scatter};
+
+/// Inputs whose spacings differ by less than this factor, as where a few points are missing, count as equally fine.
+const SAME_RATIO: f64 = 1.1;
+
+/// A Minkowski map of data among those of simulations: how far it deviates, where, and how often that happens.
+///
+/// For each measure, such as EVQ, and each pixel: EVQ_MEAN and EVQ_STD, mean and standard deviation (n - 1) of the
+/// simulations; EVQ_SIGMA, the data less that mean, in these standard deviations; EVQ_LOCAL_PERCENTILE, the share of
+/// simulations with a lower value at the pixel, and EVQ_GLOBAL_PERCENTILE, that of all pixels of all simulations with a
+/// lower value, both from 0 to 100, an equal value counting one half; EVQ_COUNT, the number of simulations that are not
+/// masked there.
+///
+/// The report gives the places that deviate most, at least a window's diameter apart, and p, the probability that one of
+/// so many maps has as large a deviation anywhere: the data's rank among the largest |sigma| of all maps, each compared
+/// with all others. This takes a second reading of the simulations; no more than one of them is in memory.
+#[derive(Args, Debug)]
+#[command(mut_args(|arg| if WITHOUT_WORK.contains(&arg.get_id().as_str()) { arg } else { arg.requires("work") }))]
+#[command(after_help = "\
+Examples:
+  longan map sky.fits sims/*.fits -o maps/ --measure evq,rank4-mid
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.fits
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.nc --smooth 10 --regions 20 --level 2.5
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.fits --format json > report.json
+  longan compare maps/sky.fits maps/sim*.fits -o deviation.fits --scatter 264,-17 evq,rank4-mid
+  longan compare sky.fits sims/*.fits -o deviation.fits --work work/ --window 10 --mask mask.fits
+
+Inputs are Minkowski maps of longan, all made in the same way, of any ordering; their masks may differ. Of several windows \
+and thresholds in a file each is compared: EVQ_WINDOW_4_THRESHOLD_1 is the first threshold of EVQ in windows of 4 \
+degrees, and --measure evq is all of them. With --work they \
+are maps of any kind, of which Minkowski maps are made first, by the options of `longan map`, in that folder; those that \
+it holds already, made by the same options, are not made again. Direction measures are angles and are not compared.")]
+pub(crate) struct Arguments {
+    /// File of the data: a Minkowski map; with --work a map.
+    #[arg(value_name = "DATA")]
+    data: PathBuf,
+    /// Files of simulations, at least two, of the same kind.
+    #[arg(required = true, value_name = "SIMULATIONS")]
+    simulations: Vec<PathBuf>,
+    /// File to write, FITS (.fits, .fits.gz) or NetCDF (.nc).
+    #[arg(long, short, value_name = "OUT")]
+    output: PathBuf,
+    /// Folder for Minkowski maps of the inputs, which are made there as `longan map` makes them.
+    #[arg(long, value_name = "DIR")]
+    work: Option<PathBuf>,
+    /// Smooth all maps first by a Gaussian of this full width at half maximum in degrees, at least two pixels; masked
+    /// pixels stay masked and do not count.
+    #[arg(long, value_name = "FWHM", allow_negative_numbers = true, value_parser = |t: &str| between(t, 0.0, 180.0))]
+    smooth: Option<f64>,
+    /// How to print the report.
+    #[arg(long, value_name = "FORMAT", default_value = "text", help_heading = "Report")]
+    format: Format,
+    /// Largest number of places to report, for each measure.
+    #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true, value_parser = whole::<usize>)]
+    #[arg(help_heading = "Report")]
+    regions: usize,
+    /// Report places that deviate by this many standard deviations or more.
+    #[arg(long, value_name = "SIGMA", default_value_t = 3.0, allow_negative_numbers = true, help_heading = "Report")]
+    #[arg(value_parser = |t: &str| between(t, 0.0, 1e9))]
+    level: f64,
+    /// Also write the values of two measures at the pixel that contains this point (longitude and latitude in degrees),
+    /// in the data and all simulations, as a table and a picture.
+    #[arg(long, value_names = ["LON,LAT", "MEASURE,MEASURE"], num_args = 2, allow_hyphen_values = true)]
+    #[arg(help_heading = "Report")]
+    scatter: Vec<String>,
+    /// Name of the picture, .png or .svg; the table has the same name with .csv [default: that of the output, with
+    /// _scatter.png].
+    #[arg(long, value_name = "FILE", requires = "scatter", help_heading = "Report")]
+    scatter_output: Option<PathBuf>,
+    #[command(flatten)]
+    mapping: Mapping,
+    /// Replace existing outputs.
+    #[arg(long, help_heading = "Output")]
+    overwrite: bool,
+    #[command(flatten)]
+    jobs: Jobs,
+    #[command(flatten)]
+    running: Running,
+}
+
+/// Options that make sense without --work. All others say how Minkowski maps are made.
+const WITHOUT_WORK: [&str; 19] = [
+    "data",
+    "simulations",
+    "output",
+    "work",
+    "smooth",
+    "format",
+    "regions",
+    "level",
+    "scatter",
+    "scatter_output",
+    "overwrite",
+    "measure",
+    "hdu",
+    "ignore_coordsys",
+    "ordering",
+    "float32",
+    "threads",
+    "quiet",
+    "help",
+];
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    arguments.running.start()?;
+    let scatter = arguments.checked()?;
+    let kind = Kind::of(&arguments.output)?;
+    let files = match &arguments.work {
+        Some(folder) => {
+            let inputs: Vec<&Path> = arguments.inputs().collect();
+            let measures = arguments.mapping.measures("compare")?;
+            let column = |measure: &Arc<dyn Measure>| Column::to_be(measure.column(), measure.unit());
+            let columns: Vec<Column> = measures.iter().map(column).collect();
+            columns.iter().try_for_each(Column::check)?;
+            arguments.check_together(&inputs)?;
+            let made = |inputs: &[&Path]| {
+                let (mapping, jobs, running) = (&arguments.mapping, &arguments.jobs, &arguments.running);
+                work::minkowski_maps(folder, inputs, mapping, measures.clone(), jobs, running)
+            };
+            if let Some(scatter) = &scatter {
+                // Whether the place is masked shows before all simulations are measured.
+                scatter.check_among(&columns)?;
+                let data = made(&inputs[..1])?.pop().context("data")?;
+                scatter.check(&data)?;
+            }
+            made(&inputs)?
+        }
+        None => arguments.said()?,
+    };
+    let (data, simulations) = files.split_first().context("data")?;
+    let ignore_coordsys = arguments.mapping.input().ignore_coordsys;
+    simulations.iter().try_for_each(|simulation| data.check(simulation, ignore_coordsys))?;
+    if let Some(difference) = simulations.iter().find_map(|simulation| data.masked_otherwise(simulation)) {
+        arguments.running.warn(format_args!("{difference}; simulations should have gone through what the data has"));
+    }
+    let columns = arguments.columns(&files)?;
+    let pair = scatter.as_ref().map(|scatter| scatter.pair(&columns)).transpose()?;
+    let grid = Healpix::new(data.nside)?;
+    check_memory(grid, 12 * columns.len())?;
+    let smoothing = arguments.smooth.map(|fwhm| Smoothing::new(grid, fwhm)).transpose()?;
+    if let Some(other) = simulations.iter().find(|other| other.input_nside != data.input_nside) {
+        arguments.running.warn(format_args!(
+            "{} was measured at Nside {}, and {} at Nside {}; shapes depend on the resolution",
+            shown(&data.path),
+            data.input_nside,
+            shown(&other.path),
+            other.input_nside
+        ));
+    }
+
+    if let Some(other) = simulations.iter().find(|other| other.way.is_empty() != data.way.is_empty()) {
+        let said =
+            |file: &Said| if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) };
+        arguments.running.warn(format_args!(
+            "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
+            shown(&data.path),
+            said(data),
+            shown(&other.path),
+            said(other)
+        ));
+    }
+    let apart = |other: &&Said| match (data.ratio, other.ratio) {
+        (Some(one), Some(other)) => (one / other).ln().abs() > SAME_RATIO.ln(),
+        _ => false,
+    };
+    if let Some(other) = simulations.iter().find(apart) {
+        arguments.running.warn(format_args!(
+            "the input of {} has another spacing than that of {}; shapes depend on the resolution",
+            shown(&data.path),
+            shown(&other.path)
+        ));
+    }
+
+    let first = data.read(&columns[0])?;
+    let layout = arguments.mapping.layout().layout(&first, grid, kind, 1).with_context(|| shown(&data.path))?;
+    let read = |file: &Said| -> anyhow::Result<Vec<Vec<f64>>> {
+        let maps = columns.iter().map(|column| Ok(file.read(column)?.into_values()));
+        let maps = maps.collect::<Result<Vec<_>, Error>>()?;
+        let Some(smoothing) = &smoothing else { return Ok(maps) };
+        let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
+        smoothing.apply(&maps).with_context(|| shown(&file.path))
+    };
+    let mut ensembles: Vec<Ensemble> = read(data)?.into_iter().map(Ensemble::new).collect();
+    let mut points = Vec::new();
+    if let (Some(scatter), Some(pair)) = (&scatter, pair) {
+        points.push(scatter.point(grid, pair.map(|i| ensembles[i].data())));
+        scatter.check_point(&data.path, grid, points[0], pair.map(|i| &columns[i]))?;
+    }
+    let progress = Progress::new(shown(&arguments.data), arguments.running.quiet);
+    let steps = 2 * simulations.len();
+    for (i, simulation) in simulations.iter().enumerate() {
+        let maps = read(simulation)?;
+        for (ensemble, map) in ensembles.iter_mut().zip(&maps) {
+            ensemble.add(map).with_context(|| shown(&simulation.path))?;
+        }
+        if let (Some(scatter), Some(pair)) = (&scatter, pair) {
+            points.push(scatter.point(grid, pair.map(|i| maps[i].as_slice())));
+        }
+        progress.set((i + 1) as f64 / steps as f64);
+    }
+    if let Some(scatter) = &scatter {
+        scatter.check_simulations(grid, &points[1..])?;
+    }
+    let mut largest = vec![Vec::new(); columns.len()];
+    for (i, simulation) in simulations.iter().enumerate() {
+        for (j, map) in read(simulation)?.iter().enumerate() {
+            largest[j].push(ensembles[j].largest_left_out(map).with_context(|| shown(&simulation.path))?);
+        }
+        progress.set((simulations.len() + i + 1) as f64 / steps as f64);
+    }
+    drop(progress);
+
+    let mut report = Report {
+        data: shown(&arguments.data),
+        simulations: simulations.len(),
+        nside: data.nside,
+        smoothing_fwhm_deg: arguments.smooth,
+        level_sigma: arguments.level,
+        measures: Vec::new(),
+        output: shown(&arguments.output),
+        scatter: Vec::new(),
+    };
+    let mut maps = Vec::new();
+    for ((column, ensemble), largest) in columns.iter().zip(&ensembles).zip(largest) {
+        let (of, mut columns) = arguments.of_measure(grid, column, ensemble, largest);
+        report.measures.push(of);
+        maps.append(&mut columns);
+    }
+    drop(ensembles);
+    let step = arguments.step(data, &report, maps);
+    let mut step = Some(step);
+    sink::write(&arguments.output, kind, layout, arguments.overwrite, |_| {
+        step.take().ok_or_else(|| Error::NoResult { reason: "there is but one step".to_owned() })
+    })?;
+    if let (Some(scatter), Some(pair)) = (&scatter, pair) {
+        let files: Vec<&Path> = arguments.inputs().collect();
+        report.scatter = scatter.write(&files, &points, pair.map(|i| &columns[i]), arguments.overwrite)?;
+    }
+    if arguments.running.quiet {
+        return Ok(());
+    }
+    match arguments.format {
+        Format::Text => print(&report.text()),
+        Format::Json => print(&format!("{}\n", serde_json::to_string_pretty(&report)?)),
+    }
+}
+
+impl Arguments {
+    /// All files, the data first.
+    fn inputs(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.data).chain(&self.simulations).map(PathBuf::as_path)
+    }
+
+    /// Checks the arguments themselves, before anything is read; the scatter plot asked for.
+    fn checked(&self) -> anyhow::Result<Option<Scatter>> {
+        if let [only] = &self.simulations[..] {
+            return Err(misused(
+                "compare",
+                format!("'{}' is the only simulation, and a standard deviation needs at least two", shown(only)),
+            ));
+        }
+        let scatter = match &self.scatter[..] {
+            [at, pair] => {
+                let output = self.scatter_output.clone().unwrap_or_else(|| {
+                    let name = self.output.file_name().unwrap_or_default().to_string_lossy();
+                    let stem = name.trim_end_matches(".gz");
+                    let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
+                    self.output.with_file_name(format!("{stem}_scatter.png"))
+                });
+                let at: At = at.parse().map_err(|problem| wrong("--scatter", at, problem))?;
+                Some(Scatter::new(at, pair, output).map_err(|problem| wrong("--scatter", pair, problem))?)
+            }
+            _ => None,
+        };
+        let mut seen = HashSet::new();
+        let data = self.data.canonicalize().unwrap_or_else(|_| self.data.clone());
+        let outputs: Vec<&Path> =
+            std::iter::once(self.output.as_path()).chain(scatter.iter().flat_map(Scatter::outputs)).collect();
+        Kind::of(&self.output)?;
+        outputs.iter().try_for_each(|output| check_apart(output, self.inputs().chain(self.mapping.mask())))?;
+        outputs.iter().try_for_each(|output| formats::check_writable(output, self.overwrite))?;
+        for path in &self.simulations {
+            let simulation = path.canonicalize().unwrap_or_else(|_| path.clone());
+            if simulation == data {
+                self.running.warn(format_args!("{}: the data is among the simulations", shown(path)));
+            } else if !seen.insert(simulation) {
+                self.running.warn(format_args!("{}: this simulation is given twice, and counts twice", shown(path)));
+            }
+        }
+        Ok(scatter)
+    }
+
+    /// Refuses maps that do not go together, before they are measured.
+    fn check_together(&self, inputs: &[&Path]) -> anyhow::Result<()> {
+        let (mapping, input) = (&self.mapping, self.mapping.input());
+        let in_value = mapping.analysis().threshold_unit == ThresholdUnit::Value;
+        let mut together = Together::new(!input.ignore_coordsys, in_value);
+        inputs.iter().try_for_each(|path| together.add(path, &input.open(path)?.about()))
+    }
+
+    /// What the files say of themselves: Minkowski maps, all of them.
+    fn said(&self) -> anyhow::Result<Vec<Said>> {
+        let hdu = self.mapping.input().hdu;
+        let said = self.inputs().map(|path| Ok((path, Said::of(path, hdu)?))).collect::<anyhow::Result<Vec<_>>>()?;
+        if let Some((path, _)) = said.iter().find(|(_, said)| said.is_none()) {
+            match said.iter().find(|(_, said)| said.is_some()) {
+                Some((other, _)) => bail!(
+                    "{} is a Minkowski map of longan, but {} is none; compare one kind with itself",
+                    shown(other),
+                    shown(path)
+                ),
+                None => bail!(
+                    "{}: this is no Minkowski map of longan; make them with `longan map`, or on the way with --work DIR",
+                    shown(path)
+                ),
+            }
+        }
+        Ok(said.into_iter().filter_map(|(_, said)| said).collect())
+    }
+
+    /// The columns to compare: those asked for, or those that all files have.
+    fn columns(&self, files: &[Said]) -> anyhow::Result<Vec<Column>> {
+        let data = &files[0];
+        let lacking = |column: &Column| files.iter().find(|file| !file.has(column));
+        let asked: Vec<&str> = if self.work.is_some() { Vec::new() } else { self.mapping.names().collect() };
+        let mut columns = Vec::new();
+        for name in &asked {
+            let missing = |file: &Said| {
+                format!("{}: there is no measure '{name}'; there are {}", shown(&file.path), file.listed())
+            };
+            let mut called = data.columns.iter().filter(|column| column.is_called(name)).peekable();
+            ensure!(called.peek().is_some(), missing(data));
+            for column in called {
+                if let Some(file) = lacking(column) {
+                    bail!(missing(file));
+                }
+                column.check()?;
+                if !columns.contains(column) {
+                    columns.push(column.clone());
+                }
+            }
+        }
+        if !asked.is_empty() {
+            return Ok(columns);
+        }
+        let mut left_out = Vec::new();
+        for column in &data.columns {
+            match lacking(column) {
+                Some(file) => {
+                    left_out.push(format!("{}: {} has only {}", column.name, shown(&file.path), file.listed()));
+                }
+                None if column.is_direction() => {
+                    left_out.push(format!("{}: it is an angle, of which there is no mean or order", column.name));
+                }
+                None => columns.push(column.clone()),
+            }
+        }
+        if !columns.is_empty() {
+            left_out.iter().for_each(|what| self.running.warn(format_args!("left out is {what}")));
+        }
+        if columns.is_empty() {
+            let other = data.columns.iter().find_map(lacking);
+            match other {
+                Some(other) => bail!(
+                    "{} has the measures {}, but {} has {}; compare maps of the same measures",
+                    shown(&data.path),
+                    data.listed(),
+                    shown(&other.path),
+                    other.listed()
+                ),
+                None => {
+                    bail!("{}: there are only angles, {}; compare other measures", shown(&data.path), data.listed())
+                }
+            }
+        }
+        Ok(columns)
+    }
+
+    /// What is reported of a measure, and its maps.
+    fn of_measure(
+        &self,
+        grid: Healpix,
+        column: &Column,
+        ensemble: &Ensemble,
+        largest: Vec<Option<f64>>,
+    ) -> (OfMeasure, Vec<MapColumn>) {
+        let found = ensemble.deviation();
+        let rank = ensemble.largest().map(|data| Rank::new(data, largest));
+        let window = column.window.unwrap_or(0.0);
+        let regions = peaks(grid, &found.sigma, 2.0 * window, self.level, self.regions);
+        let regions = regions.iter().map(|peak| Region {
+            lon_deg: peak.lon,
+            lat_deg: peak.lat,
+            pixel: peak.pixel,
+            value: ensemble.data()[peak.pixel],
+            mean: found.mean[peak.pixel],
+            standard_deviation: found.std[peak.pixel],
+            sigma: peak.sigma,
+            local_percentile: found.local_percentile[peak.pixel],
+            global_percentile: found.global_percentile[peak.pixel],
+            simulations: found.count[peak.pixel] as usize,
+        });
+        let of = OfMeasure {
+            measure: column.name.clone(),
+            unit: column.unit.clone(),
+            window_deg: window,
+            largest_sigma: ensemble.largest(),
+            simulations_as_large: rank.map(|rank| rank.as_large),
+            p_value: rank.map(|rank| rank.p_value()),
+            regions: regions.collect(),
+        };
+        let map = |suffix: &str, unit: &str, words: &str, values: Vec<f64>| MapColumn {
+            name: format!("{}_{suffix}", column.name),
+            unit: unit.to_owned(),
+            long_name: format!("{words} of {}", column.name),
+            values,
+        };
+        let maps = vec![
+            map("MEAN", &column.unit, "mean over simulations", found.mean),
+            map("STD", &column.unit, "standard deviation over simulations (n - 1)", found.std),
+            map("SIGMA", "", "data less mean, in standard deviations, of simulations", found.sigma),
+            map("LOCAL_PERCENTILE", "percent", "share of simulations with a lower value here", found.local_percentile),
+            map(
+                "GLOBAL_PERCENTILE",
+                "percent",
+                "share of pixels of all simulations with a lower value",
+                found.global_percentile,
+            ),
+            map("COUNT", "", "number of unmasked simulations", found.count),
+        ];
+        (of, maps)
+    }
+
+    /// What is written.
+    fn step(&self, data: &Said, report: &Report, columns: Vec<MapColumn>) -> Step {
+        let command = command(&self.simulations, &self.simulations[0]);
+        let mut cards: Vec<Card> = vec![
+            creator(),
+            text("DATAFILE", self.data.to_string_lossy(), "Minkowski map compared, or map it is made of"),
+            integer("NSIMS", self.simulations.len(), "number of simulations"),
+            text("SIMFIRST", self.simulations[0].to_string_lossy(), "the first of them"),
+            real("SMOOTH", self.smooth.unwrap_or(0.0), "[deg] FWHM of the smoothing, 0: none"),
+            text("TIES", "half", "an equal value counts one half in percentiles"),
+        ];
+        cards.extend(data.repeated.iter().cloned());
+        for (n, of) in (1..).zip(&report.measures) {
+            cards.push(text(&numbered("MEASURE", n), of.measure.clone(), "measure compared"));
+            if let (Some(largest), Some(p)) = (of.largest_sigma, of.p_value) {
+                cards.push(real(&numbered("LARGEST", n), largest, "its largest deviation in sigma"));
+                cards.push(real(&numbered("PVALUE", n), p, "probability of one as large anywhere"));
+            }
+        }
+        let mut attributes = vec![text("TITLE", format!("{} among simulations", shown(&self.data)), "")];
+        attributes.extend(cards.iter().cloned());
+        attributes.push(text("HISTORY", command.clone(), ""));
+        cards.push(text("COMMAND", command, "command that made this file, but for simulations"));
+        let table = Table { name: "DEVIATION".to_owned(), cards, columns };
+        Step { time: None, tables: vec![table], attributes, numbers: Vec::new() }
+    }
+}
+
+/// A complaint about the value of an option.
+fn wrong(option: &str, value: &str, problem: String) -> anyhow::Error {
+    misused("compare", format!("invalid value '{value}' for '{option} <LON,LAT> <MEASURE,MEASURE>': {problem}"))
+}

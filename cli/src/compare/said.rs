@@ -1,0 +1,426 @@
+//! What files of Minkowski maps say of themselves, and whether it goes together.
+//!
+//! Only headers are read here.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{bail, ensure};
+use longan_formats::{
+    self as formats, Card, CardValue, Field, FieldDescription, GridDescription, Selection, TableDescription,
+    TablePlace, is_alike, units_differ,
+};
+use longan_grid::{CoordinateSystem, Map};
+
+use super::super::mismatch::of_coordinates;
+use super::super::options::{is_same_file, shown};
+use super::super::output::{card, integer, numbered, real};
+use super::super::regridding;
+
+/// Thresholds in standard deviations, counted back from the map's unit, are the same within this.
+const SAME_THRESHOLD: f64 = 1e-6;
+
+/// A file of Minkowski maps.
+pub(super) struct Said {
+    /// The file.
+    pub(super) path: PathBuf,
+    /// Their Nside.
+    pub(super) nside: usize,
+    /// Their coordinate system, where the file names one.
+    pub(super) coordinates: Option<CoordinateSystem>,
+    /// Their columns.
+    pub(super) columns: Vec<Column>,
+    /// What has to be the same in all files: what it is, and its value.
+    facts: Vec<(&'static str, String)>,
+    /// The unit in which thresholds were given: sigma, or the map's.
+    threshold_unit: String,
+    /// How masks were applied: what it is, and its value.
+    masking: Vec<(&'static str, String)>,
+    /// Nside of the map that was measured.
+    pub(super) input_nside: String,
+    /// The way in which that map came to HEALPix; empty where the file does not say it.
+    pub(super) way: String,
+    /// The spacing of what it was made of, in sides of a pixel, where the file says it.
+    pub(super) ratio: Option<f64>,
+    /// Entries that the comparison's header repeats.
+    pub(super) repeated: Vec<Card>,
+}
+
+/// A map of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Column {
+    /// The measure, with window and threshold where the file has several, as in EVQ_WINDOW_4_THRESHOLD_1.
+    pub(super) name: String,
+    pub(super) unit: String,
+    /// Radius of its windows in degrees, where the file tells.
+    pub(super) window: Option<f64>,
+    /// The thresholds that it is of, in the unit in which they were given.
+    thresholds: Vec<f64>,
+    /// The FITS extension that it is in.
+    hdu: Option<usize>,
+    /// What it is called there.
+    field: String,
+}
+
+impl Column {
+    /// One that is still to be made.
+    pub(super) fn to_be(name: String, unit: &str) -> Self {
+        let field = name.clone();
+        Column { name, unit: unit.to_owned(), window: None, thresholds: Vec::new(), hdu: None, field }
+    }
+
+    /// Whether it holds angles, which have neither a mean nor an order.
+    pub(super) fn is_direction(&self) -> bool {
+        self.unit == "deg" || self.measure().to_ascii_uppercase().ends_with("DIRECTION")
+    }
+
+    /// Refuses what cannot be compared.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        ensure!(
+            !self.is_direction(),
+            "{} is an angle, of which there is no mean or order; compare other measures",
+            self.name
+        );
+        Ok(())
+    }
+
+    /// Its name without window and threshold.
+    fn measure(&self) -> &str {
+        PARTS
+            .iter()
+            .filter_map(|part| self.name.split_once(part))
+            .map(|(measure, _)| measure)
+            .next()
+            .unwrap_or(&self.name)
+    }
+
+    /// Whether a name is its whole one.
+    fn is(&self, name: &str) -> bool {
+        is_alike(&self.name, name)
+    }
+
+    /// Whether a name is its, whole or without window and threshold.
+    pub(super) fn is_called(&self, name: &str) -> bool {
+        self.is(name) || is_alike(self.measure(), name)
+    }
+
+    /// Refuses another column that was not made in the same way.
+    fn check_same(&self, path: &Path, other: &Column, other_path: &Path, unit: &str) -> anyhow::Result<()> {
+        let window = |column: &Column| column.window.map(|window| format!("{window} degrees")).unwrap_or_default();
+        let count = |column: &Column| column.thresholds.len().to_string();
+        let facts = [
+            ("a window of".to_owned(), window(self), window(other)),
+            ("the number of thresholds".to_owned(), count(self), count(other)),
+            (format!("{} in the unit", self.name), self.unit.clone(), other.unit.clone()),
+        ];
+        for (what, mine, others) in &facts {
+            ensure!(mine == others, differ(what, (path, mine), (other_path, others)));
+        }
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME_THRESHOLD * (1.0 + a.abs());
+        let [mine, others] = [self, other].map(|column| listed(&column.thresholds, unit));
+        ensure!(
+            self.thresholds.iter().zip(&other.thresholds).all(near),
+            differ("thresholds", (path, &mine), (other_path, &others))
+        );
+        Ok(())
+    }
+}
+
+/// What begins the names of windows and thresholds in those of columns.
+const PARTS: [&str; 2] = ["_WINDOW_", "_THRESHOLD_"];
+
+/// What differs between two files.
+fn differ(what: &str, (path, mine): (&Path, &str), (other, others): (&Path, &str)) -> String {
+    let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
+    format!(
+        "{} has {what} {}, but {} has {what} {}; compare maps that were made in the same way",
+        shown(path),
+        or_none(mine),
+        shown(other),
+        or_none(others)
+    )
+}
+
+impl Said {
+    /// What a file says of itself; nothing where it holds no Minkowski map of longan.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or its maps have several times.
+    pub(super) fn of(path: &Path, hdu: Option<usize>) -> anyhow::Result<Option<Self>> {
+        let tables = formats::describe(path)?.tables;
+        let is_asked_for = |table: &&TableDescription| match table.place {
+            TablePlace::Hdu { hdu: this, .. } => hdu.is_none_or(|hdu| hdu == this),
+            _ => true,
+        };
+        let tables: Vec<_> = tables.iter().filter(is_asked_for).filter(|table| is_minkowski(table)).collect();
+        let Some(first) = tables.first() else { return Ok(None) };
+        check_times(path, &tables)?;
+        let several = tables.len() > 1 && matches!(first.place, TablePlace::Hdu { .. });
+        let columns = tables.iter().flat_map(|table| columns(table, several)).collect();
+        Ok(Some(Self::of_table(path, first, columns)))
+    }
+
+    fn of_table(path: &Path, table: &TableDescription, columns: Vec<Column>) -> Self {
+        let word = |key: &str| table.card(key).map(words).unwrap_or_default();
+        let GridDescription::Healpix { nside, coordinates, .. } = table.grid else { unreachable!("a Minkowski map") };
+        let formulas: Vec<String> =
+            table.cards.iter().filter(|card| card.key.starts_with("FORMUL")).map(|card| words(&card.value)).collect();
+        let sigma = word("THRUNIT") == "sigma";
+        Said {
+            path: path.to_owned(),
+            nside,
+            coordinates,
+            facts: vec![
+                ("Nside", nside.to_string()),
+                ("the body's side", word("BODY")),
+                ("the weight", word("WEIGHT")),
+                ("the unit of thresholds", word("THRUNIT")),
+                ("the least contour in window radii", table.card("MINCONT").map_or("0".to_owned(), words)),
+                ("the formulas", formulas.join("; ")),
+            ],
+            threshold_unit: if sigma { "sigma".to_owned() } else { word("INUNIT") },
+            masking: MASKING.map(|(key, what)| (what, word(key))).to_vec(),
+            input_nside: word("INNSIDE"),
+            way: word(regridding::WAY),
+            ratio: table.card(regridding::RATIO).and_then(number),
+            repeated: repeated(table, &columns),
+            columns,
+        }
+    }
+
+    /// Whether another file was made in the same way.
+    ///
+    /// # Errors
+    /// What differs, with both files and both values.
+    pub(super) fn check(&self, other: &Said, ignore_coordsys: bool) -> anyhow::Result<()> {
+        let (path, other_path) = (&*self.path, &*other.path);
+        for (what, mine) in &self.facts {
+            let others = other.facts.iter().find(|(same, _)| same == what).map_or("", |(_, value)| value);
+            ensure!(mine == others, differ(what, (path, mine), (other_path, others)));
+        }
+        if !self.way.is_empty() && !other.way.is_empty() {
+            ensure!(self.way == other.way, differ("the way to HEALPix", (path, &self.way), (other_path, &other.way)));
+        }
+        let (unit, other_unit) = (&self.threshold_unit, &other.threshold_unit);
+        ensure!(
+            !units_differ(unit, other_unit),
+            differ("thresholds in the unit", (path, unit), (other_path, other_unit))
+        );
+        let [mine, others] = [self, other].map(|said| (shown(&said.path), said.coordinates));
+        if let Some(mismatch) = of_coordinates((&mine.0, mine.1), (&others.0, others.1)).filter(|_| !ignore_coordsys) {
+            bail!(mismatch);
+        }
+        let pairs = self.columns.iter().filter_map(|column| Some((column, other.column(column)?)));
+        pairs.into_iter().try_for_each(|(column, others)| column.check_same(path, others, other_path, unit))
+    }
+
+    /// What is different about the masks of another file, both sides named; nothing where there is no difference.
+    pub(super) fn masked_otherwise(&self, other: &Said) -> Option<String> {
+        let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
+        let same = |mine: &str, others: &str| {
+            mine == others || !mine.is_empty() && !others.is_empty() && is_same_file(mine.as_ref(), others.as_ref())
+        };
+        let different = self.masking.iter().zip(&other.masking).filter(|((_, mine), (_, others))| !same(mine, others));
+        let [mine, others] = different
+            .map(|((what, mine), (_, others))| [mine, others].map(|value| format!("{what} {}", or_none(value))))
+            .fold([Vec::new(), Vec::new()], |[mut mine, mut others], [one, other]| {
+                mine.push(one);
+                others.push(other);
+                [mine, others]
+            });
+        let (path, other) = (shown(&self.path), shown(&other.path));
+        (!mine.is_empty()).then(|| format!("{path} has {}, but {other} has {}", mine.join(", "), others.join(", ")))
+    }
+
+    /// Its column that is the same as one of another file.
+    fn column(&self, column: &Column) -> Option<&Column> {
+        self.columns.iter().find(|other| other.is(&column.name))
+    }
+
+    /// Whether it has a column that is the same.
+    pub(super) fn has(&self, column: &Column) -> bool {
+        self.column(column).is_some()
+    }
+
+    /// Its columns, for people.
+    pub(super) fn listed(&self) -> String {
+        self.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Reads a column.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub(super) fn read(&self, column: &Column) -> Result<Map, formats::Error> {
+        let Column { hdu, field, .. } = self.column(column).unwrap_or(column).clone();
+        formats::read(&self.path, &Selection { field: Some(Field::Name(field)), hdu, ..Selection::default() })
+    }
+}
+
+/// Refuses maps of several times, of which a comparison takes one.
+fn check_times(path: &Path, tables: &[&TableDescription]) -> anyhow::Result<()> {
+    let along = tables.iter().find_map(|table| table.dimensions.first());
+    if let Some(time) = along {
+        bail!(
+            "{}: there are maps for {} places along '{}', and a comparison takes one; make them of one alone, with \
+             `longan map --select {}=...`",
+            shown(path),
+            time.len,
+            time.name,
+            time.name
+        );
+    }
+    let mut times: Vec<String> = tables.iter().map(|table| table.card("TIME").map(words).unwrap_or_default()).collect();
+    times.dedup();
+    if times.len() > 1 {
+        let numbers: Vec<String> = tables
+            .iter()
+            .filter_map(|table| match table.place {
+                TablePlace::Hdu { hdu, .. } => Some(hdu.to_string()),
+                _ => None,
+            })
+            .collect();
+        bail!(
+            "{}: there are maps for {} times, and a comparison takes one; choose an extension with --hdu ({} to {}), or make \
+             maps of one time alone, with `longan map --select time=...`",
+            shown(path),
+            times.len(),
+            numbers.first().map_or("", String::as_str),
+            numbers.last().map_or("", String::as_str)
+        );
+    }
+    Ok(())
+}
+
+/// The columns of a table. Where it is one of `several` their names have its.
+fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
+    let real = |key: &str| table.card(key).and_then(number);
+    let word = |key: &str| table.card(key).map(words).unwrap_or_default();
+    let raw: Vec<f64> = (1..).map_while(|i| real(&format!("THR{i}"))).collect();
+    let given = match (word("THRUNIT") == "sigma", real("INMEAN"), real("INSIGMA")) {
+        (true, Some(mean), Some(sigma)) => raw.iter().map(|threshold| (threshold - mean) / sigma).collect(),
+        _ => raw,
+    };
+    // A file without a header for each threshold lists all of them: "-1, 0, 1 sigma".
+    let all: Vec<f64> =
+        word("THRESHOLDS").split(',').map_while(|x| x.split_whitespace().next()?.parse().ok()).collect();
+    let windows: Vec<f64> = word("WINDOW").split(',').filter_map(|window| window.trim().parse().ok()).collect();
+    let column = |field: &FieldDescription| {
+        let (hdu, name, own) = match &table.place {
+            TablePlace::Hdu { hdu, name } => {
+                (Some(*hdu), field.name.clone(), name.as_deref().filter(|_| several).map(|own| format!("_{own}")))
+            }
+            TablePlace::Variable { variable } => (None, variable.clone(), None),
+            TablePlace::File {} => (None, field.name.clone(), None),
+        };
+        let field_name = name.clone();
+        let legal = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+        let name = name + &own.unwrap_or_default().chars().map(legal).collect::<String>();
+        let window = match windows[..] {
+            [window] => Some(window),
+            _ => windows.iter().copied().find(|window| {
+                let part = format!("_WINDOW_{window}").replace('.', "_");
+                name.split_once(&part).is_some_and(|(_, rest)| rest.is_empty() || rest.starts_with("_T"))
+            }),
+        };
+        let place = name.rsplit_once(PARTS[1]).and_then(|(_, place)| place.parse::<usize>().ok());
+        let thresholds = match place.and_then(|place| all.get(place.checked_sub(1)?)) {
+            Some(threshold) => vec![*threshold],
+            None if given.is_empty() => all.clone(),
+            None => given.clone(),
+        };
+        let unit = field.unit.clone().unwrap_or_default();
+        Column { name, unit, window, thresholds, hdu, field: field_name }
+    };
+    table.fields.iter().map(column).collect()
+}
+
+/// How masks are applied, by the entries of headers that say it.
+const MASKING: [(&str, &str); 3] =
+    [("MASKFILE", "the mask"), ("MASKTHR", "the mask threshold"), ("MAXMASK", "the largest masked share")];
+
+/// The entries of a table's header that the header of a comparison of these columns repeats.
+fn repeated(table: &TableDescription, columns: &[Column]) -> Vec<Card> {
+    const KEYS: [&str; 17] = [
+        "INFILE",
+        "INFIELD",
+        "INUNIT",
+        "INNSIDE",
+        regridding::WAY,
+        regridding::RATIO,
+        "INMEAN",
+        "INSIGMA",
+        "MASKFILE",
+        "MASKFLD",
+        "MASKTHR",
+        "MAXMASK",
+        "MINCONT",
+        "BODY",
+        "WEIGHT",
+        "THRUNIT",
+        "WINDOW",
+    ];
+    let note = "of the map measured, or of how";
+    let mut windows: Vec<String> = Vec::new();
+    let mut thresholds: Vec<f64> = Vec::new();
+    for column in columns {
+        windows.extend(column.window.map(|window| window.to_string()).filter(|window| !windows.contains(window)));
+        let new: Vec<f64> = column.thresholds.iter().copied().filter(|x| !thresholds.contains(x)).collect();
+        thresholds.extend(new);
+    }
+    let repeat = |key: &str| {
+        let value = match key {
+            "WINDOW" if windows.len() > 1 => CardValue::Text(windows.join(", ")),
+            _ => table.card(key)?.clone(),
+        };
+        Some(card(key, value, note))
+    };
+    let mut cards: Vec<Card> = KEYS.into_iter().filter_map(repeat).collect();
+    cards.push(integer("NTHRESH", thresholds.len(), "number of thresholds"));
+    let number = |key| table.card(key).and_then(number);
+    let (zero, one) = match (table.card("THRUNIT").map(words).as_deref(), number("INMEAN"), number("INSIGMA")) {
+        (Some("sigma"), Some(mean), Some(sigma)) => (mean, sigma),
+        _ => (0.0, 1.0),
+    };
+    let threshold =
+        |(i, x): (usize, &f64)| real(&numbered("THR", i + 1), zero + one * x, "threshold, in the unit of the field");
+    cards.extend(thresholds.iter().enumerate().map(threshold));
+    cards
+}
+
+/// The file that a file's maps were made of, as their header names it.
+pub(super) fn made_of(path: &Path) -> anyhow::Result<Option<String>> {
+    Ok(formats::describe(path)?.tables.first().and_then(|table| table.card("INFILE")).map(words))
+}
+
+/// Whether these are Minkowski maps of longan.
+fn is_minkowski(table: &TableDescription) -> bool {
+    let longan = matches!(table.card("CREATOR"), Some(CardValue::Text(creator)) if creator.starts_with("longan "));
+    longan && table.card("WINDOW").is_some() && matches!(table.grid, GridDescription::Healpix { .. })
+}
+
+/// A value as text.
+fn words(value: &CardValue) -> String {
+    match value {
+        CardValue::Text(text) => text.clone(),
+        CardValue::Real(number) => number.to_string(),
+        CardValue::Integer(number) => number.to_string(),
+        CardValue::Logical(truth) => truth.to_string(),
+    }
+}
+
+/// A value as a number, if it is one.
+fn number(value: &CardValue) -> Option<f64> {
+    match value {
+        CardValue::Real(number) => Some(*number),
+        CardValue::Integer(number) => Some(*number as f64),
+        CardValue::Text(_) | CardValue::Logical(_) => None,
+    }
+}
+
+/// Thresholds, for people.
+fn listed(thresholds: &[f64], unit: &str) -> String {
+    let round = |x: &f64| ((x / SAME_THRESHOLD).round() * SAME_THRESHOLD * 1e6).round() / 1e6;
+    let thresholds: Vec<String> =
+        thresholds.iter().map(|x| if x.abs() < 1e6 { round(x) } else { *x }.to_string()).collect();
+    format!("{} {unit}", thresholds.join(", ")).trim_end().to_owned()
+}

@@ -1,0 +1,136 @@
+//! The command line of longan: one file a command, which reads arguments and files, calls the libraries, writes and
+//! prints. What it computes stands in the libraries.
+//!
+//! Exit status: 0 all done; 1 a file could not be read, analysed or written (others of the run may be done); 2 the
+//! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
+//! file.
+
+mod compare;
+mod demo;
+mod drawn;
+mod graph;
+mod info;
+mod input;
+mod jobs;
+mod map;
+mod mapping;
+mod measures;
+mod mismatch;
+mod options;
+mod output;
+mod plot;
+mod plugin;
+mod progress;
+mod regrid;
+mod regridding;
+mod remedies;
+mod simulate;
+mod sink;
+mod totals;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// Shape on the sphere: Minkowski functionals and tensors of maps and other fields, in moving windows.
+///
+/// Reads HEALPix in FITS, NetCDF and Zarr, latitude-longitude grids in NetCDF and Zarr, points in CSV, surfaces in PLY.
+#[derive(Parser)]
+#[command(
+    name = "longan",
+    version,
+    arg_required_else_help = true,
+    subcommand_required = true,
+    propagate_version = true
+)]
+#[command(after_help = "\
+Examples:
+  longan demo                            all of it on simulated data, with a picture
+  longan info sky.fits                   what a file holds
+  longan map sky.fits -o sky_evq.fits    EVQ in windows of 6 degrees, as in the paper
+  longan map sims/*.fits -o maps/        many maps, one output each
+  longan compare sky_evq.fits maps/*.fits -o deviation.fits
+  longan map era5.nc -o evq.nc --variable z --select level=500
+  longan plot sky_evq.fits -o evq.png    a picture of a map, PNG or SVG
+  longan totals sky.fits                 area, length and Euler characteristic
+  longan graph sky.fits -o graph.png     the same against threshold, drawn
+  longan regrid stations.csv -o rainfall.fits --variable rain
+  longan plugin new slant                a crate in Rust for a measure of one's own
+
+Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
+Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Map(map::Arguments),
+    Compare(compare::Arguments),
+    Totals(totals::Arguments),
+    Graph(graph::Arguments),
+    Plot(plot::Arguments),
+    Info(info::Arguments),
+    Regrid(regrid::Arguments),
+    Measures(measures::Arguments),
+    Plugin(plugin::Arguments),
+    Simulate(simulate::Arguments),
+    Demo(demo::Arguments),
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    #[cfg(unix)]
+    clean_up_when_stopped();
+    let done = match Arguments::parse().command {
+        Command::Map(arguments) => map::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Totals(arguments) => totals::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
+        Command::Plot(arguments) => plot::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Regrid(arguments) => regrid::run(&arguments),
+        Command::Measures(arguments) => measures::run(&arguments),
+        Command::Plugin(arguments) => plugin::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => match e.downcast::<clap::Error>() {
+            Ok(misused) => {
+                let _ = misused.print();
+                ExitCode::from(2)
+            }
+            Err(e) => {
+                let _ = writeln!(std::io::stderr(), "longan: {}", remedies::told(&e));
+                ExitCode::FAILURE
+            }
+        },
+    }
+}
+
+/// What clap says about an argument, for one that only makes sense together with others.
+fn misused(command: &str, problem: String) -> anyhow::Error {
+    let mut arguments = Arguments::command();
+    arguments.build();
+    let command = arguments.find_subcommand_mut(command).expect("a command of this program");
+    command.error(ErrorKind::ValueValidation, problem).into()
+}
+
+/// Removes unfinished files when the program is told to end, and then ends it in the way of that signal.
+#[cfg(unix)]
+fn clean_up_when_stopped() {
+    use signal_hook::consts::TERM_SIGNALS;
+    // Without it, as before a file is written, the signals end the program by themselves.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(TERM_SIGNALS) else { return };
+    std::thread::spawn(move || {
+        if let Some(signal) = signals.forever().next() {
+            longan_formats::abandon();
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
+    });
+}

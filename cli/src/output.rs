@@ -1,0 +1,283 @@
+//! Minkowski maps as they are written: columns, and in headers and attributes what was done.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use longan::measures::{Measure, Origin};
+use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
+use longan_formats::{Card, CardValue, NetcdfColumn};
+use longan_grid::Map;
+
+use super::input::Input;
+use super::regridding;
+use super::sink::{MapColumn, Step, Table};
+
+/// What is said in headers about a map and its analysis.
+pub(crate) struct Provenance<'a> {
+    /// The input file.
+    pub(crate) path: &'a Path,
+    /// The field analysed.
+    pub(crate) map: &'a Map,
+    /// Where it came from.
+    pub(crate) input: Option<&'a Input>,
+    /// What was done with it.
+    pub(crate) analysis: &'a Analysis,
+    /// The command that did it.
+    pub(crate) command: String,
+}
+
+/// A header entry.
+pub(crate) fn card(key: &str, value: CardValue, comment: &str) -> Card {
+    Card { key: key.to_owned(), value, comment: comment.to_owned() }
+}
+
+/// A text entry.
+pub(crate) fn text(key: &str, value: impl Into<String>, comment: &str) -> Card {
+    card(key, CardValue::Text(value.into()), comment)
+}
+
+/// A real entry.
+pub(crate) fn real(key: &str, value: f64, comment: &str) -> Card {
+    card(key, CardValue::Real(value), comment)
+}
+
+/// An integer entry.
+pub(crate) fn integer(key: &str, value: usize, comment: &str) -> Card {
+    card(key, CardValue::Integer(value as i64), comment)
+}
+
+/// Name and version of this program.
+pub(crate) fn creator() -> Card {
+    text("CREATOR", concat!("longan ", env!("CARGO_PKG_VERSION")), "program that wrote this file")
+}
+
+/// Formulas and plugins that measures come from.
+fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
+    let (mut formulas, mut plugins) = (Vec::new(), Vec::new());
+    for measure in measures {
+        match measure.as_ref().origin() {
+            Origin::Formula(formula) => formulas.push(formula),
+            Origin::Plugin(plugin) if !plugins.contains(&plugin) => plugins.push(plugin),
+            Origin::Plugin(_) | Origin::Program => (),
+        }
+    }
+    let formulas =
+        (1..).zip(formulas).map(|(n, text)| self::text(&numbered("FORMULA", n), text, "formula of a column"));
+    let plugins = (1..).zip(plugins).map(|(n, text)| self::text(&numbered("PLUGIN", n), text, "plugin of measures"));
+    formulas.chain(plugins).collect()
+}
+
+/// A keyword with a number, within the eight characters of FITS: FORMULA1 to FORMULA9, FORMUL10 and so on.
+pub(crate) fn numbered(keyword: &str, number: usize) -> String {
+    let number = number.to_string();
+    let room = 8usize.saturating_sub(number.len()).min(keyword.len());
+    format!("{}{number}", &keyword[..room])
+}
+
+impl Provenance<'_> {
+    /// What is written of the Minkowski maps of one step.
+    pub(crate) fn step(&self, maps: Vec<MinkowskiMaps>, measures: &[impl AsRef<dyn Measure>]) -> Step {
+        let windows = self.analysis.windows.len();
+        let thresholds = maps.len() / windows;
+        let name = |i: usize, window: f64| match (windows, thresholds) {
+            (1, 1) => "MINKOWSKI MAP".to_owned(),
+            (1, _) => format!("THRESHOLD {}", i + 1),
+            (_, 1) => format!("WINDOW {window}"),
+            (_, _) => format!("WINDOW {window} THRESHOLD {}", i % thresholds + 1),
+        };
+        let origins = origins(measures);
+        let attributes = [self.attributes(&maps, thresholds > 1), origins.clone()].concat();
+        let numbers = self.numbers(&maps[0]);
+        let tables = maps.into_iter().enumerate().map(|(i, maps)| {
+            let of = self.words(&maps, (thresholds > 1).then_some(i % thresholds));
+            Table {
+                name: name(i, maps.window),
+                cards: [self.cards(&maps), origins.clone()].concat(),
+                columns: std::iter::zip(measures.iter().map(AsRef::as_ref), maps.values)
+                    .map(|(measure, values)| MapColumn {
+                        name: measure.column(),
+                        unit: measure.unit().to_owned(),
+                        long_name: match measure.origin() {
+                            Origin::Formula(formula) => formula,
+                            Origin::Program | Origin::Plugin(_) => format!("{} {of}", measure.definition()),
+                        },
+                        values,
+                    })
+                    .collect(),
+            }
+        });
+        Step { time: self.map.time.clone(), tables: tables.collect(), attributes, numbers }
+    }
+
+    /// Of what a map is, in words: the window, and the threshold if it is of one.
+    fn words(&self, maps: &MinkowskiMaps, threshold: Option<usize>) -> String {
+        let window = match maps.window {
+            0.0 => "of each pixel".to_owned(),
+            window => format!("in windows of {window} degrees"),
+        };
+        match threshold {
+            Some(i) => format!("{window}, at {}", self.thresholds(&self.analysis.thresholds.values()[i..=i])),
+            None => window,
+        }
+    }
+
+    /// Thresholds as they were asked for.
+    fn thresholds(&self, values: &[f64]) -> String {
+        let unit = match (self.analysis.threshold_unit, &self.map.unit) {
+            (ThresholdUnit::Sigma, _) => " sigma",
+            (_, Some(unit)) => &format!(" {unit}"),
+            (_, None) => "",
+        };
+        let values: Vec<_> = values.iter().map(f64::to_string).collect();
+        format!("{}{unit}", values.join(", "))
+    }
+
+    /// Whether thresholds depend on the map's mean and scatter.
+    fn of_the_step(&self) -> bool {
+        self.map.time.is_some() && self.analysis.threshold_unit == ThresholdUnit::Sigma
+    }
+
+    /// What is said of a file as a whole: the entries of the first table, but for what differs between tables or steps.
+    fn attributes(&self, maps: &[MinkowskiMaps], sequence: bool) -> Vec<Card> {
+        let windows: Vec<_> = self.analysis.windows.iter().map(f64::to_string).collect();
+        let mut cards = vec![text("TITLE", format!("Minkowski map of {}", self.map.name), "")];
+        for card in self.cards(&maps[0]) {
+            let of_input = ["INMEAN", "INSIGMA"].contains(&&*card.key);
+            let of_thresholds =
+                card.key == "NTHRESH" || card.key.strip_prefix("THR").is_some_and(|n| n.parse::<u32>().is_ok());
+            cards.push(match card.key.as_str() {
+                _ if of_input && self.map.time.is_some() => continue,
+                _ if of_thresholds && (sequence || self.of_the_step()) => continue,
+                "WINDOW" if windows.len() > 1 => text("WINDOW", windows.join(", "), ""),
+                "PSIERROR" => real("PSIERROR", maps.iter().map(|m| m.ways.error).fold(0.0, f64::max), ""),
+                "COMMAND" => text("HISTORY", self.command.clone(), ""),
+                _ => card,
+            });
+        }
+        cards.push(text("THRESHOLDS", self.thresholds(self.analysis.thresholds.values()), ""));
+        cards
+    }
+
+    /// The numbers that each step has by itself.
+    fn numbers(&self, maps: &MinkowskiMaps) -> Vec<(NetcdfColumn, f64)> {
+        if self.map.time.is_none() {
+            return Vec::new();
+        }
+        let number = |name: &str, what: &str, value: f64| {
+            let (name, long_name) = (name.to_owned(), format!("{what} of the unmasked pixels of {}", self.map.name));
+            (NetcdfColumn { name, unit: self.map.unit.clone().unwrap_or_default(), long_name }, value)
+        };
+        vec![
+            number("input_mean", "mean", maps.of_map.mean),
+            number("input_sigma", "standard deviation", maps.of_map.sigma),
+        ]
+    }
+
+    fn cards(&self, maps: &MinkowskiMaps) -> Vec<Card> {
+        let (map, analysis, thresholds) = (self.map, self.analysis, maps.thresholds.values());
+        let mut cards = input_cards(self.path, map);
+        if let Some(input) = self.input {
+            cards.extend(mask_cards(input));
+        }
+        cards.extend([
+            real("INMEAN", maps.of_map.mean, "mean of the unmasked pixels"),
+            real("INSIGMA", maps.of_map.sigma, "their standard deviation"),
+            real("WINDOW", maps.window, "[deg] radius of the window, 0: the pixel itself"),
+            real("PSIERROR", maps.ways.error, "error of psi_s over sum of |weights|, 0: direct sum"),
+            real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
+            real("MINCONT", analysis.min_contour, "[window radii] least contour for ratios"),
+            text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
+            text(
+                "WEIGHT",
+                if analysis.weight == Weight::Length { "length" } else { "curvature" },
+                "W_1 or W_2 tensors",
+            ),
+            text(
+                "THRUNIT",
+                if analysis.threshold_unit == ThresholdUnit::Sigma { "sigma" } else { "value" },
+                "unit in which thresholds were given",
+            ),
+            integer("NTHRESH", thresholds.len(), "number of thresholds averaged over"),
+        ]);
+        // Without scatter there are no multiples of it.
+        let known = analysis.threshold_unit == ThresholdUnit::Value || maps.of_map.sigma > 0.0;
+        for (i, threshold) in thresholds.iter().enumerate().filter(|_| known) {
+            cards.push(real(&format!("THR{}", i + 1), *threshold, "threshold, in the unit of the field"));
+        }
+        cards.push(text("COMMAND", self.command.clone(), "command that made this file"));
+        cards
+    }
+}
+
+/// What is said of the map that a file is made of.
+pub(crate) fn input_cards(path: &Path, map: &Map) -> Vec<Card> {
+    let mut cards = vec![
+        creator(),
+        text("INFILE", path.to_string_lossy(), "file analysed"),
+        text("INFIELD", map.name.clone(), "field analysed"),
+        text("INUNIT", map.unit.clone().unwrap_or_default(), "its unit"),
+        integer("INNSIDE", map.grid().nside(), "its Nside"),
+    ];
+    cards.extend(regridding::cards(map));
+    cards
+}
+
+/// What is said of its mask, if there is one.
+pub(crate) fn mask_cards(input: &Input) -> Vec<Card> {
+    let Some(mask) = &input.mask else { return Vec::new() };
+    let mut cards = vec![text("MASKFILE", mask.to_string_lossy(), "mask")];
+    if let Some(field) = &input.mask_field {
+        cards.push(text("MASKFLD", field.to_string().trim_matches('\''), "field of the mask"));
+    }
+    cards.push(real("MASKTHR", input.mask_threshold, "masked below this mask value"));
+    cards
+}
+
+/// Options that say how a program runs, and nothing about what it makes.
+const RUNNING: [&str; 4] = ["--resume", "--overwrite", "--quiet", "--verbose"];
+
+/// Those of them that have a value.
+const RUNNING_WITH_VALUE: [&str; 4] = ["--jobs", "--memory", "--shard", "--threads"];
+
+/// Those of them that are letters, which may stand before another.
+const RUNNING_LETTERS: [char; 2] = ['q', 'v'];
+
+/// The command that makes an output of this input: as given, without the other inputs and without options that do not
+/// matter to what is made.
+pub(crate) fn command(inputs: &[PathBuf], input: &Path) -> String {
+    let others: HashSet<_> = inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
+    let mut arguments = std::env::args_os().skip(1);
+    let mut words: Vec<String> = Vec::new();
+    let mut only_inputs = false;
+    while let Some(argument) = arguments.next() {
+        let mut word = argument.to_string_lossy().into_owned();
+        // A mask may be an input too.
+        let is_mask = words.last().is_some_and(|last| ["-m", "--mask"].contains(&last.as_str()));
+        if others.contains(argument.as_os_str()) && !is_mask {
+            continue;
+        }
+        only_inputs |= word == "--";
+        if !only_inputs {
+            let name = word.split_once('=').map_or(word.as_str(), |(name, _)| name);
+            if RUNNING.contains(&name) {
+                continue;
+            }
+            if RUNNING_WITH_VALUE.contains(&name) {
+                if name == word {
+                    arguments.next();
+                }
+                continue;
+            }
+            if let Some(letters) = word.strip_prefix('-').filter(|letters| letters.starts_with(RUNNING_LETTERS)) {
+                let rest = letters.trim_start_matches(RUNNING_LETTERS);
+                if rest.is_empty() {
+                    continue;
+                }
+                word = format!("-{rest}");
+            }
+        }
+        words.push(word);
+    }
+    let quoted = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_else(|_| words.join(" "));
+    format!("longan {quoted}")
+}
