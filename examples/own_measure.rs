@@ -2,9 +2,9 @@
 //!
 //! Run with `cargo run --release --example own_measure`.
 
-use longan::measures::{Measure, Needs, Window, testing};
+use longan::measures::{Measure, Needs, Quantity, Window, testing};
 use longan::simulate::Waves;
-use longan::{Analysis, Healpix};
+use longan::{Analysis, Healpix, go_on};
 
 struct ShapeIndex;
 
@@ -15,6 +15,10 @@ impl Measure for ShapeIndex {
 
     fn definition(&self) -> String {
         "ratio of the rank 2 tensor's eigenvalues, smaller over larger".to_owned()
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity::Ratio
     }
 
     fn unit(&self) -> &str {
@@ -41,8 +45,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let field = Waves::new(6.0, 2)?.map(Healpix::new(64)?);
     let measures: [Box<dyn Measure>; 1] = [Box::new(ShapeIndex)];
-    let maps = Analysis::default().minkowski_maps(&field, &measures, |_| ())?.remove(0);
-    let values: Vec<f64> = maps.values[0].iter().copied().filter(|v| !v.is_nan()).collect();
+    let maps = Analysis::default().minkowski_maps(&field, &measures, go_on)?;
+    let values: Vec<f64> = maps["shape-index"].iter().copied().filter(|v| !v.is_nan()).collect();
     println!("mean shape index in {} windows: {:.3}", values.len(), values.iter().sum::<f64>() / values.len() as f64);
     Ok(())
 }

@@ -4,17 +4,22 @@
 //! each window's moments go to every measure.
 
 use std::collections::BTreeSet;
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use longan_grid::{Healpix, Map};
+use longan_grid::{Healpix, MapView};
 use longan_measures::{Measure, MeasureError, Window};
+use ndarray::Array2;
 
 use crate::contour::{Body, Field};
+use crate::minkowski_maps::{Block, MinkowskiMaps};
 use crate::moments::{Layout, Selection, Weight};
 use crate::region::Region;
 use crate::statistics::{Statistics, statistics};
 use crate::thresholds::{Doubt, ThresholdError, Thresholds};
 use crate::totals::{Regional, Totals, totals_within};
-use crate::window::{self, Moments, MovingWindows, Summation, Ways, Windows};
+use crate::window::{self, Moments, MovingWindows, Stopped, Summation, SummationCounts, Windows};
 
 /// What thresholds are counted in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,9 +36,9 @@ pub enum ThresholdUnit {
 pub struct Analysis {
     /// Radii of the windows in degrees, up to 180; 0: each pixel by itself.
     pub windows: Vec<f64>,
-    /// Thresholds, averaged over.
+    /// The thresholds.
     pub thresholds: Thresholds,
-    /// What they are counted in.
+    /// What thresholds are counted in.
     pub threshold_unit: ThresholdUnit,
     /// Which side of a threshold is the body.
     pub body: Body,
@@ -46,6 +51,8 @@ pub struct Analysis {
     /// In windows with less contour than this, in window radii, the mean over the thresholds, measures that are
     /// [relative](Measure::is_relative) are undefined.
     pub min_contour: f64,
+    /// Whether each threshold is kept by itself instead of the mean over all.
+    pub by_threshold: bool,
     /// How windows are summed.
     pub summation: Summation,
 }
@@ -61,6 +68,7 @@ impl Default for Analysis {
             nside_out: None,
             max_masked: 1.0 / 16.0,
             min_contour: 0.0,
+            by_threshold: false,
             summation: Summation::default(),
         }
     }
@@ -155,6 +163,24 @@ pub enum AnalysisError {
     /// A measure that fails.
     #[error(transparent)]
     Measure(#[from] MeasureError),
+    /// A field that is on no grid.
+    #[error(transparent)]
+    Grid(#[from] longan_grid::Error),
+    /// The caller said to stop.
+    #[error("the analysis was stopped")]
+    Stopped,
+}
+
+impl From<Stopped> for AnalysisError {
+    fn from(_: Stopped) -> Self {
+        AnalysisError::Stopped
+    }
+}
+
+impl From<Infallible> for AnalysisError {
+    fn from(never: Infallible) -> Self {
+        match never {}
+    }
 }
 
 fn named(weight: Weight) -> &'static str {
@@ -168,34 +194,6 @@ fn other(weight: Weight) -> Weight {
     match weight {
         Weight::Length => Weight::Curvature,
         Weight::Curvature => Weight::Length,
-    }
-}
-
-/// Minkowski maps of one field for one window: one array a measure.
-#[derive(Clone, Debug)]
-pub struct MinkowskiMaps {
-    /// The grid of the maps.
-    pub grid: Healpix,
-    /// Radius of the window in degrees.
-    pub window: f64,
-    /// The thresholds, in the field's unit, of which these are the mean.
-    pub thresholds: Thresholds,
-    /// Statistics of the field analysed.
-    pub of_map: Statistics,
-    /// For each measure, in the order given, its values in RING order; NaN where masked or undefined.
-    pub values: Vec<Vec<f64>>,
-    /// Number of windows of which too large a share is masked; all measures are undefined there.
-    pub masked: usize,
-    /// How windows were summed.
-    pub ways: Ways,
-}
-
-impl MinkowskiMaps {
-    /// The mean of a measure over some pixels of the grid where it is defined, and their number; NaN where there are none.
-    pub fn mean(&self, measure: usize, pixels: &[bool]) -> (f64, usize) {
-        let defined = self.values[measure].iter().zip(pixels).filter(|(value, within)| **within && !value.is_nan());
-        let (sum, windows) = defined.fold((0.0, 0), |(sum, n), (value, _)| (sum + value, n + 1));
-        (sum / windows as f64, windows)
     }
 }
 
@@ -240,19 +238,13 @@ impl Analysis {
     ///
     /// # Errors
     /// See [`check`](Self::check), and where measures need another weight.
-    pub fn memory(
-        &self,
-        map: Healpix,
-        measures: &[impl AsRef<dyn Measure>],
-        sequence: bool,
-    ) -> Result<usize, AnalysisError> {
+    pub fn memory(&self, map: Healpix, measures: &[impl AsRef<dyn Measure>]) -> Result<usize, AnalysisError> {
         let output = self.check(map)?;
         let thresholds = self.thresholds.values().len();
-        let selection = Selection { by_threshold: sequence, ..self.selection(measures)? };
-        let rows = Layout::new(&selection, thresholds, true).rows;
-        let tables = if sequence { thresholds } else { 1 };
+        let rows = Layout::new(&self.selection(measures)?, thresholds, true).rows;
+        let tables = if self.by_threshold { thresholds } else { 1 };
         let windows = self.windows.iter().map(|degrees| window::memory(map, output, degrees.to_radians(), rows));
-        let columns = tables * self.windows.len() * (measures.len() + 1) * size_of::<f64>();
+        let columns = tables * self.windows.len() * measures.len() * size_of::<f64>();
         let maps = output.pixels().saturating_mul(columns);
         Ok(windows.fold(maps.saturating_add(window::band_memory(map, rows)), usize::saturating_add))
     }
@@ -261,7 +253,14 @@ impl Analysis {
     ///
     /// # Errors
     /// Where the map is masked everywhere, or has no standard deviation to count in.
-    pub fn thresholds_of(&self, map: &Map) -> Result<(Thresholds, Statistics), AnalysisError> {
+    pub fn thresholds_of<'a, M>(&self, map: M) -> Result<(Thresholds, Statistics), AnalysisError>
+    where
+        M: TryInto<MapView<'a>, Error: Into<AnalysisError>>,
+    {
+        self.resolved(&map.try_into().map_err(Into::into)?)
+    }
+
+    fn resolved(&self, map: &MapView<'_>) -> Result<(Thresholds, Statistics), AnalysisError> {
         let of_map = statistics(map.values()).ok_or(AnalysisError::AllMasked)?;
         let thresholds = match self.threshold_unit {
             ThresholdUnit::Value => self.thresholds.clone(),
@@ -281,63 +280,51 @@ impl Analysis {
 
     /// What makes one doubt that the thresholds are meant for a field. In standard deviations they may lie as close
     /// together as they like.
-    pub fn doubt(&self, map: &Map) -> Option<Doubt> {
+    pub fn doubt<'a>(&self, map: impl TryInto<MapView<'a>>) -> Option<Doubt> {
         let in_sigma = self.threshold_unit == ThresholdUnit::Sigma;
         // The mean lies within the values, so there is no need to look at them.
         if in_sigma && self.thresholds.values().contains(&0.0) {
             return None;
         }
-        let (thresholds, of_map) = self.thresholds_of(map).ok()?;
+        let (thresholds, of_map) = self.resolved(&map.try_into().ok()?).ok()?;
         thresholds.doubt(of_map).filter(|doubt| !in_sigma || matches!(doubt, Doubt::Missed { .. }))
     }
 
-    /// Minkowski maps, for each window: each measure about all pixels of the output grid, averaged over the thresholds.
+    /// Minkowski maps, for each window: each measure about all pixels of the output grid, averaged over the thresholds or,
+    /// with [`by_threshold`](Self::by_threshold), for each by itself.
     ///
-    /// `progress` is told the share done, from 0 to 1. The result does not depend on the number of threads.
-    ///
-    /// # Errors
-    /// See [`check`](Self::check) and [`thresholds_of`](Self::thresholds_of).
-    pub fn minkowski_maps(
-        &self,
-        map: &Map,
-        measures: &[impl AsRef<dyn Measure> + Sync],
-        progress: impl FnMut(f64),
-    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
-        self.maps(map, measures, false, progress)
-    }
-
-    /// The same for every threshold by itself: for each window the thresholds in ascending order.
+    /// The field is a [`Map`](longan_grid::Map), or an array or slice in RING order: see [`MapView`]. `progress` is told the
+    /// share done, from 0 to 1, and says whether to go on ([`go_on`](crate::go_on) always does). The result does not depend
+    /// on the number of threads.
     ///
     /// # Errors
-    /// As [`minkowski_maps`](Self::minkowski_maps).
-    pub fn sequence(
+    /// See [`check`](Self::check) and [`thresholds_of`](Self::thresholds_of); those of measures; [`AnalysisError::Grid`] for a
+    /// number of values that no grid has; [`AnalysisError::Stopped`].
+    pub fn minkowski_maps<'a, M>(
         &self,
-        map: &Map,
+        map: M,
         measures: &[impl AsRef<dyn Measure> + Sync],
-        progress: impl FnMut(f64),
-    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
-        self.maps(map, measures, true, progress)
-    }
-
-    fn maps(
-        &self,
-        map: &Map,
-        measures: &[impl AsRef<dyn Measure> + Sync],
-        by_threshold: bool,
-        progress: impl FnMut(f64),
-    ) -> Result<Vec<MinkowskiMaps>, AnalysisError> {
+        progress: impl FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<MinkowskiMaps, AnalysisError>
+    where
+        M: TryInto<MapView<'a>, Error: Into<AnalysisError>>,
+    {
+        let map = &map.try_into().map_err(Into::into)?;
         let grid = self.check(map.grid())?;
-        let (thresholds, of_map) = self.thresholds_of(map)?;
+        let (thresholds, of_map) = self.resolved(map)?;
         if measures.is_empty() {
             return Err(AnalysisError::NoMeasure);
         }
-        let selection = Selection { by_threshold, ..self.selection(measures)? };
-        let of_each = match by_threshold {
+        let selection = self.selection(measures)?;
+        let of_each = match self.by_threshold {
             true => thresholds.values().iter().map(|&t| Thresholds::new(vec![t])).collect::<Result<_, _>>()?,
             false => vec![thresholds.clone()],
         };
-        let columns = measures.len() + 1;
+        let columns = measures.len();
         let relative: Vec<bool> = measures.iter().map(|measure| measure.as_ref().is_relative()).collect();
+        let radii: Vec<f64> = self.windows.iter().map(|degrees| degrees.to_radians()).collect();
+        // Windows that are lost to the mask, of each radius; they come once for each threshold that is kept by itself.
+        let lost: Vec<AtomicUsize> = radii.iter().map(|_| AtomicUsize::new(0)).collect();
         let evaluate = |batch: &mut [Moments], values: &mut [f64]| {
             batch.iter_mut().for_each(|moments| moments.scale_up(self.weight));
             let masked =
@@ -357,13 +344,14 @@ impl Analysis {
                     }
                 }
             }
-            // The last column tells which windows are not lost to the mask; those without pixels are lost to their size.
-            let kept = batch.iter().enumerate().filter(|(_, moments)| moments.pixels == 0 || !masked(moments));
-            kept.for_each(|(place, _)| values[place * columns + measures.len()] = 1.0);
-            Ok::<(), MeasureError>(())
+            // Windows without pixels are lost to their size.
+            for moments in batch.iter().filter(|moments| moments.pixels > 0 && masked(moments)) {
+                let radius = radii.iter().position(|radius| *radius == moments.radius);
+                radius.iter().for_each(|&i| _ = lost[i].fetch_add(1, Ordering::Relaxed));
+            }
+            Ok::<(), AnalysisError>(())
         };
         let field = Field::new(map.grid(), map.values(), &thresholds, self.body);
-        let radii: Vec<f64> = self.windows.iter().map(|degrees| degrees.to_radians()).collect();
         let windows = MovingWindows {
             field: &field,
             selection: &selection,
@@ -372,16 +360,39 @@ impl Analysis {
             summation: self.summation,
         };
         let all = windows.visit_batches(columns, evaluate, progress)?;
-        let maps = all.into_iter().zip(&self.windows).flat_map(|(Windows { columns, ways }, &window)| {
-            let mut columns = columns.into_iter();
-            let maps = of_each.iter().map(|thresholds| {
-                let values = columns.by_ref().take(measures.len()).collect();
-                let masked = columns.next().map_or(0, |seen| seen.iter().filter(|seen| seen.is_nan()).count());
-                MinkowskiMaps { grid, window, thresholds: thresholds.clone(), of_map, values, masked, ways }
-            });
-            maps.collect::<Vec<_>>()
-        });
-        Ok(maps.collect())
+        let names: Vec<String> = measures.iter().map(|measure| measure.as_ref().name()).collect();
+        let mut blocks = Vec::new();
+        for ((Windows { values, counts }, &window), lost) in all.into_iter().zip(&self.windows).zip(lost) {
+            let masked = lost.into_inner() / of_each.len();
+            for (values, thresholds) in values.into_iter().zip(&of_each) {
+                let (thresholds, measures) = (thresholds.clone(), names.clone());
+                blocks.push(Block { window, thresholds, measures, values, masked, counts });
+            }
+        }
+        Ok(MinkowskiMaps { grid, of_map, blocks })
+    }
+
+    /// The result for a field that has no shape to measure, masked everywhere or constant: nothing but undefined values.
+    ///
+    /// # Errors
+    /// See [`check`](Self::check); [`AnalysisError::Grid`] for a number of values that no grid has.
+    pub fn undefined<'a, M>(&self, map: M, measures: &[impl AsRef<dyn Measure>]) -> Result<MinkowskiMaps, AnalysisError>
+    where
+        M: TryInto<MapView<'a>, Error: Into<AnalysisError>>,
+    {
+        let map = map.try_into().map_err(Into::into)?;
+        let grid = self.check(map.grid())?;
+        let each = if self.by_threshold { self.thresholds.values().len() } else { 1 };
+        let block = |window: f64| Block {
+            window,
+            thresholds: self.thresholds.clone(),
+            measures: measures.iter().map(|measure| measure.as_ref().name()).collect(),
+            values: Array2::from_elem((measures.len(), grid.pixels()), f64::NAN),
+            masked: grid.pixels(),
+            counts: SummationCounts::default(),
+        };
+        let blocks = self.windows.iter().flat_map(|&window| std::iter::repeat_n(block(window), each)).collect();
+        Ok(MinkowskiMaps { grid, of_map: statistics(map.values()).unwrap_or(Statistics::NOTHING), blocks })
     }
 
     /// Area, length and curvature of the whole unmasked sphere for each threshold, curvature made up for the edges beside
@@ -390,7 +401,10 @@ impl Analysis {
     ///
     /// # Errors
     /// See [`thresholds_of`](Self::thresholds_of).
-    pub fn totals(&self, map: &Map) -> Result<(Thresholds, Vec<Totals>, f64), AnalysisError> {
+    pub fn totals<'a, M>(&self, map: M) -> Result<(Thresholds, Vec<Totals>, f64), AnalysisError>
+    where
+        M: TryInto<MapView<'a>, Error: Into<AnalysisError>>,
+    {
         let (thresholds, whole) = self.totals_within(map, None)?;
         Ok((thresholds, whole.made_up(), whole.masked))
     }
@@ -399,8 +413,12 @@ impl Analysis {
     ///
     /// # Errors
     /// See [`thresholds_of`](Self::thresholds_of).
-    pub fn totals_within(&self, map: &Map, region: Option<&Region>) -> Result<(Thresholds, Regional), AnalysisError> {
-        let (thresholds, _) = self.thresholds_of(map)?;
+    pub fn totals_within<'a, M>(&self, map: M, region: Option<&Region>) -> Result<(Thresholds, Regional), AnalysisError>
+    where
+        M: TryInto<MapView<'a>, Error: Into<AnalysisError>>,
+    {
+        let map = map.try_into().map_err(Into::into)?;
+        let (thresholds, _) = self.resolved(&map)?;
         let regional = totals_within(&Field::new(map.grid(), map.values(), &thresholds, self.body), region);
         Ok((thresholds, regional))
     }
@@ -425,7 +443,7 @@ impl Analysis {
 
     /// The moments that some measure needs.
     fn selection(&self, measures: &[impl AsRef<dyn Measure>]) -> Result<Selection, AnalysisError> {
-        let mut selection = Selection { weight: self.weight, ..Selection::default() };
+        let mut selection = Selection { weight: self.weight, by_threshold: self.by_threshold, ..Selection::default() };
         let mut ranks = BTreeSet::new();
         for measure in measures.iter().map(AsRef::as_ref) {
             let needs = measure.needs();

@@ -1,19 +1,46 @@
 //! Data against simulations, pixel by pixel, and how surprising the largest deviation is anywhere.
 //!
-//! [`Ensemble`] takes one simulation after the other, in memory that does not grow with their number; a second reading
-//! gives the largest deviation of each, for a [`Rank`]. [`peaks`] are the places that deviate most. What the maps are,
-//! and where they come from, is left to others.
+//! A [`Comparison`] reads all simulations twice, one after the other, in memory that does not grow with their number: the
+//! [`first`](Comparison::first) pass gives mean, scatter and percentiles at each pixel, the
+//! [`second`](Comparison::second) the largest deviation of each simulation from all other maps. The [`Outcome`] has the
+//! data's [`Rank`] among these, and the [`Outlier`]s. What the maps are, and where they come from, is left to others.
+//!
+//! ```
+//! use longan::compare::Comparison;
+//!
+//! // The twelve pixels of Nside 1; the data has a seven where simulations have 0, 1, 2, 3.
+//! let mut data = vec![1.5; 12];
+//! data[3] = 7.0;
+//! let simulations: Vec<Vec<f64>> = (0..4).map(|i| (0..12).map(|p| f64::from((i + p) % 4)).collect()).collect();
+//!
+//! let mut comparison = Comparison::new(&data)?;
+//! simulations.iter().try_for_each(|simulation| comparison.first(simulation))?;
+//! simulations.iter().try_for_each(|simulation| comparison.second(simulation))?;
+//! let outcome = comparison.finish()?;
+//! let outliers = outcome.outliers(30.0, 3.0, 10);
+//! assert_eq!((outliers.len(), outliers[0].peak.pixel, outliers[0].local_percentile), (1, 3, 100.0));
+//! assert_eq!(outcome.rank.unwrap().p_value(), 0.2);
+//! # Ok::<(), longan::compare::ComparisonError>(())
+//! ```
 
+mod comparison;
 mod ensemble;
 mod peaks;
 
-pub use ensemble::{Deviation, Ensemble, Rank};
+pub use comparison::{Comparison, Outcome, Outlier};
+pub use ensemble::{Deviation, Rank};
 pub use peaks::{Peak, peaks};
 
 /// Why maps cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum ComparisonError {
+    /// Data that is no map.
+    #[error("{pixels} values are not a HEALPix map: no Nside has 12 Nside² = {pixels} pixels")]
+    NotHealpix {
+        /// Number of values.
+        pixels: usize,
+    },
     /// A simulation on another grid.
     #[error("a simulation of {found} pixels cannot be compared with data of {expected}; bring both to the same Nside")]
     Pixels {
@@ -21,5 +48,22 @@ pub enum Error {
         found: usize,
         /// Pixels of the data.
         expected: usize,
+    },
+    /// Simulations too few for a standard deviation.
+    #[error("a standard deviation needs at least two simulations, and there are {found}")]
+    TooFew {
+        /// Number of simulations.
+        found: usize,
+    },
+    /// A simulation that comes to the first pass after the second has begun.
+    #[error("a simulation came to the first pass after the second had begun; give all to the first pass before")]
+    SecondBegan,
+    /// Passes of different lengths.
+    #[error("the first pass had {first} simulations and the second {second}; give the same to both")]
+    Passes {
+        /// Simulations of the first pass.
+        first: usize,
+        /// Simulations of the second pass, the one refused among them.
+        second: usize,
     },
 }

@@ -156,7 +156,7 @@ mod tests {
             for (end, [a, b]) in piece.ends.into_iter().zip(piece.between) {
                 let [a, b] = [a, b]
                     .map(|p| grid.centre(p))
-                    .map(|(theta, phi)| DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()));
+                    .map(|(theta, phi)| DVec3::from_array(longan_grid::directions::at_colatitude(theta, phi)));
                 // On the geodesic between both.
                 let detour = a.angle_between(end) + end.angle_between(b) - a.angle_between(b);
                 assert!(detour.abs() < 1e-6 && a.cross(b).normalize().dot(end).abs() < 1e-12, "{piece:?}");

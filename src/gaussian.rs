@@ -1,4 +1,4 @@
-//! What an isotropic Gaussian field has of area, length and curvature at a threshold, from its two scales.
+//! The area, length and curvature expected of an isotropic Gaussian field at a threshold, from its two scales.
 //!
 //! σ0² is the field's variance and σ1² that of its gradient. With ν = (t − mean)/σ0, per area of the unit sphere
 //! (Tomita 1986; Schmalzing & Górski 1998, MNRAS 297, 355; Collischon et al. 2024):
@@ -92,14 +92,14 @@ fn of_ring(map: &Map, ring: usize, sigma0: f64) -> (f64, f64) {
     (square, area)
 }
 
-/// What turns differences along the edges of a cell into gradients.
+/// The geometry that turns differences along the edges of a cell into gradients.
 struct Edges {
     count: usize,
     area: f64,
     /// For each corner |b|²/Δ, a·b/Δ and |a|²/Δ with a and b the edges to the next corner and to the last, and
     /// Δ = |a|²|b|² − (a·b)²: the inverse of their Gram matrix.
     inverse: [[f64; 3]; 4],
-    /// What the square of f0 − f1 + f2 − f3 counts.
+    /// The factor of the square of f0 − f1 + f2 − f3.
     twist: f64,
 }
 

@@ -3,24 +3,22 @@
 //! A few lines do what `longan map` does:
 //!
 //! ```
-//! use longan::{Analysis, Map, measures::find};
+//! use longan::{Analysis, ThresholdUnit, go_on, measures::find};
+//! use ndarray::Array1;
 //!
 //! // Any field in RING order; here a body of one pixel at Nside 8.
-//! let mut values = vec![0.0; 768];
-//! values[400] = 1.0;
-//! let map = Map::new("a pixel", values)?;
-//!
+//! let mut field = Array1::zeros(768);
+//! field[400] = 1.0;
 //! let analysis = Analysis {
 //!     windows: vec![20.0],
 //!     thresholds: "0.5".parse()?,
-//!     threshold_unit: longan::ThresholdUnit::Value,
+//!     threshold_unit: ThresholdUnit::Value,
 //!     ..Analysis::default()
 //! };
-//! let maps = analysis.minkowski_maps(&map, &[find("w2")?, find("evq")?], |_| ())?;
-//! let (w2, evq) = (&maps[0].values[0], &maps[0].values[1]);
+//! let maps = analysis.minkowski_maps(&field, &[find("w2")?, find("evq")?], go_on)?;
 //! // The contour's total curvature in a window that holds all of it: 2π less the body's area.
-//! assert!((w2[400] - std::f64::consts::TAU).abs() < 0.02);
-//! assert!(evq[400] > 1.0 && evq[0].is_nan());
+//! assert!((maps["w2"][400] - std::f64::consts::TAU).abs() < 0.02);
+//! assert!(maps["evq"][400] > 1.0 && maps["evq"][0].is_nan());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -39,7 +37,11 @@ pub mod compare;
 pub mod contour;
 mod contour_lines;
 pub mod gaussian;
+pub mod graph;
+mod minkowski_maps;
 pub mod moments;
+pub mod quantile;
+mod recipe;
 pub mod region;
 pub mod simulate;
 pub mod smoothing;
@@ -49,12 +51,15 @@ pub mod totals;
 pub mod transport;
 pub mod window;
 
-pub use analysis::{Analysis, AnalysisError, DEFAULT_NSIDE_OUT, MinkowskiMaps, ThresholdUnit};
+pub use analysis::{Analysis, AnalysisError, DEFAULT_NSIDE_OUT, ThresholdUnit};
 pub use contour::Body;
 pub use contour_lines::contour_lines;
 pub use longan_grid as grid;
 pub use longan_grid::{Healpix, Map};
 pub use longan_measures as measures;
+pub use minkowski_maps::{Block, MinkowskiMaps};
 pub use moments::Weight;
+pub use recipe::{FieldRecipe, MeasureRecipe, REVISION, Recipe};
 pub use region::Region;
 pub use thresholds::Thresholds;
+pub use window::go_on;

@@ -1,12 +1,10 @@
-//! A part of the sphere: all that lies within a distance of a point.
+//! A part of the sphere: all that lies within a distance of a point, in degrees, and how it is written.
+//! The pixels in it are left to [`longan_grid::disc`].
 
-use std::f64::consts::FRAC_PI_2;
 use std::str::FromStr;
 
 use longan_grid::Healpix;
-
-/// A point on the edge belongs to the region; distances in radians within this are the same.
-const EDGE: f64 = 1e-12;
+use longan_grid::disc::Disc;
 
 /// All points within a radius of a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,14 +14,14 @@ pub struct Region {
     radius: f64,
 }
 
-/// What is wrong with a region.
+/// Why there is no such region.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegionError {
     /// Not three numbers.
     #[error("'{text}' is not of the form lon,lat,radius with three numbers in degrees, such as 120,-30,20")]
     Syntax {
-        /// What was given.
+        /// The text given.
         text: String,
     },
     /// A centre that is no point of the sphere.
@@ -64,19 +62,12 @@ impl Region {
 
     /// For each pixel of a grid, in RING order, whether its centre lies within.
     pub fn pixels(&self, grid: Healpix) -> Vec<bool> {
-        let half = (self.radius.to_radians() + EDGE) / 2.0;
-        let (theta, phi) = (FRAC_PI_2 - self.latitude.to_radians(), self.longitude.to_radians());
-        let sin_theta = theta.sin();
-        let within = |i: usize| {
-            let ring = grid.ring(i);
-            // sin²(d/2), free of cancellation.
-            let across = ((ring.theta() - theta) / 2.0).sin().powi(2);
-            (0..ring.len).map(move |j| {
-                let along = ((ring.phi(j as isize) - phi) / 2.0).sin().powi(2);
-                half >= FRAC_PI_2 || across + ring.sin_theta * sin_theta * along <= half.sin().powi(2)
-            })
-        };
-        (1..=grid.rings()).flat_map(within).collect()
+        self.disc().mask(grid)
+    }
+
+    /// The region as a disc.
+    pub fn disc(&self) -> Disc {
+        Disc::from_degrees(self.longitude, self.latitude, self.radius)
     }
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 /// Pixels summed at a time; the sums of the pieces are added in order, whatever the number of threads.
 const PIECE: usize = 1 << 16;
 
-/// What the unmasked pixels of a field look like.
+/// Mean, standard deviation and range of the unmasked pixels of a field, in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
     /// Number of unmasked pixels.
@@ -18,6 +18,12 @@ pub struct Statistics {
     pub mean: f64,
     /// Standard deviation: the root of the mean squared distance to the mean.
     pub sigma: f64,
+}
+
+impl Statistics {
+    /// Those of a field that is masked everywhere.
+    pub const NOTHING: Statistics =
+        Statistics { unmasked: 0, min: f64::NAN, max: f64::NAN, mean: f64::NAN, sigma: f64::NAN };
 }
 
 /// Statistics of the values that are not NaN; `None` if there is none.

@@ -10,11 +10,11 @@ mod prefix;
 pub(crate) mod reach;
 
 use std::collections::VecDeque;
-use std::convert::Infallible;
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use longan_grid::{Healpix, Ring};
+use ndarray::Array2;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -116,7 +116,7 @@ impl Default for Summation {
 
 /// Which way the windows of one radius were summed, counted in pairs of an output pixel and an input ring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Ways {
+pub struct SummationCounts {
     /// Pairs summed pixel by pixel, since that costs less or is asked for.
     pub direct: usize,
     /// Pairs summed pixel by pixel, since no fit of the phases meets the tolerance.
@@ -132,11 +132,20 @@ pub struct Ways {
 /// Values of all windows of one radius.
 #[derive(Clone, Debug)]
 pub struct Windows {
-    /// What was visited, column by column, in RING order; where thresholds are kept by themselves, all columns of the
-    /// first, then of the next.
-    pub columns: Vec<Vec<f64>>,
-    /// How it was summed.
-    pub ways: Ways,
+    /// The numbers visited, column × pixel in RING order: one array, or one for each threshold where these are kept by
+    /// themselves.
+    pub values: Vec<Array2<f64>>,
+    /// How the windows were summed.
+    pub counts: SummationCounts,
+}
+
+/// The work was stopped by the one who was told of its progress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopped;
+
+/// For `progress`, where nobody asks: goes on.
+pub fn go_on(_: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 /// Windows of several radii about all pixels of a grid, moved over one field.
@@ -157,40 +166,32 @@ pub struct MovingWindows<'a> {
 impl MovingWindows<'_> {
     /// Visits all windows, each radius by itself; the contour is followed once for all.
     ///
-    /// `visit` fills `columns` numbers for each window. `progress` is told the share done, from 0 to 1. The result does
-    /// not depend on the number of threads.
+    /// `visit` fills `columns` numbers for each window. The result does not depend on the number of threads.
     ///
     /// # Panics
     /// For radius 0 if the output grid is not the field's.
-    pub fn visit(
-        &self,
-        columns: usize,
-        visit: impl Fn(&Moments, &mut [f64]) + Sync,
-        progress: impl FnMut(f64),
-    ) -> Vec<Windows> {
+    pub fn visit(&self, columns: usize, visit: impl Fn(&Moments, &mut [f64]) + Sync) -> Vec<Windows> {
         let each = |batch: &mut [Moments], values: &mut [f64]| {
             batch.iter().zip(values.chunks_exact_mut(columns)).for_each(|(moments, values)| visit(moments, values));
-            Ok::<(), Infallible>(())
+            Ok::<(), Stopped>(())
         };
-        match self.visit_batches(columns, each, progress) {
-            Ok(windows) => windows,
-            Err(never) => match never {},
-        }
+        self.visit_batches(columns, each, go_on).expect("nobody stops the work")
     }
 
     /// The same, with many windows at a time: `visit` fills `columns` numbers for the first, then for the next. Where
-    /// thresholds are kept by themselves, each window comes once for each threshold.
+    /// thresholds are kept by themselves, each window comes once for each threshold. `progress` is told the share done, from
+    /// 0 to 1, and says whether to go on.
     ///
     /// # Errors
-    /// The northernmost of `visit`, which ends the work.
+    /// The northernmost of `visit`, which ends the work, or [`Stopped`].
     ///
     /// # Panics
     /// As [`visit`](Self::visit).
-    pub fn visit_batches<E: Send>(
+    pub fn visit_batches<E: Send + From<Stopped>>(
         &self,
         columns: usize,
         visit: impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E> + Sync,
-        mut progress: impl FnMut(f64),
+        mut progress: impl FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Vec<Windows>, E> {
         let input = self.field.grid();
         assert!(!self.radii.contains(&0.0) || self.output == input, "a window of one pixel needs the input's grid");
@@ -206,7 +207,9 @@ impl MovingWindows<'_> {
                 sweep.visit_finished(band.rings.end, &visit)?;
             }
             let last = input.ring(band.rings.end - 1);
-            progress((last.start + last.len) as f64 / input.pixels() as f64);
+            if progress((last.start + last.len) as f64 / input.pixels() as f64).is_break() {
+                return Err(Stopped.into());
+            }
         }
         Ok(sweeps.into_iter().map(|sweep| sweep.windows).collect())
     }
@@ -236,6 +239,10 @@ struct Sweep<'a> {
     groups: VecDeque<Group>,
     /// The next output ring to be reached.
     next: Option<OutputRing>,
+    /// Numbers for each window and threshold.
+    columns: usize,
+    /// Windows visited.
+    done: usize,
     windows: Windows,
 }
 
@@ -246,15 +253,15 @@ struct Group {
     reach: Range<usize>,
     /// For each quadrant the windows of each ring.
     quadrants: [Vec<Sums>; 4],
-    ways: Ways,
+    counts: SummationCounts,
 }
 
 impl<'a> Sweep<'a> {
     fn new(of: &'a MovingWindows<'a>, layout: &'a Layout, radius: f64, columns: usize) -> Self {
-        let columns = (0..columns * layout.groups).map(|_| Vec::with_capacity(of.output.pixels()));
-        let windows = Windows { columns: columns.collect(), ways: Ways::default() };
+        let values = (0..layout.groups).map(|_| Array2::zeros((columns, of.output.pixels()))).collect();
+        let windows = Windows { values, counts: SummationCounts::default() };
         let next = Some(OutputRing::new(of.field.grid(), of.output, 1, radius));
-        Sweep { of, layout, radius, groups: VecDeque::new(), next, windows }
+        Sweep { of, layout, radius, columns, groups: VecDeque::new(), next, done: 0, windows }
     }
 
     /// Adds a band of input rings to all windows that reach it.
@@ -282,7 +289,7 @@ impl<'a> Sweep<'a> {
         let reach = rings[0].reach.start..rings[rings.len() - 1].reach.end;
         let sums = |_| rings.iter().map(|ring| Sums::new(ring.in_quadrant, self.layout.rows)).collect();
         let quadrants = std::array::from_fn(sums);
-        Group { rings, reach, quadrants, ways: Ways::default() }
+        Group { rings, reach, quadrants, counts: SummationCounts::default() }
     }
 
     /// Visits the windows that reach no farther than `end`.
@@ -291,7 +298,7 @@ impl<'a> Sweep<'a> {
         end: usize,
         visit: &(impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E> + Sync),
     ) -> Result<(), E> {
-        let Windows { columns, ways } = &mut self.windows;
+        let Windows { values: all, counts } = &mut self.windows;
         while self.groups.front().is_some_and(|group| group.reach.end <= end) {
             let Some(group) = self.groups.pop_front() else { break };
             let tasks = 4 * group.rings.len();
@@ -301,15 +308,17 @@ impl<'a> Sweep<'a> {
                     let (ring, quadrant) = (task / 4, task % 4);
                     let sums = &group.quadrants[quadrant][ring];
                     let thresholds = self.of.field.thresholds();
-                    visited(&group.rings[ring], quadrant, sums, self.layout, thresholds, columns.len(), visit)
+                    visited(&group.rings[ring], quadrant, sums, self.layout, thresholds, self.columns, visit)
                 })
                 .collect();
             let values = values.into_iter().collect::<Result<Vec<_>, E>>()?;
-            let step = columns.len();
-            for (i, column) in columns.iter_mut().enumerate() {
-                values.iter().for_each(|values| column.extend(values.iter().skip(i).step_by(step)));
+            let step = self.columns * all.len();
+            for (i, mut row) in all.iter_mut().flat_map(|values| values.rows_mut()).enumerate() {
+                let visited = values.iter().flat_map(|values| values.iter().skip(i).step_by(step));
+                row.iter_mut().skip(self.done).zip(visited).for_each(|(value, visited)| *value = *visited);
             }
-            ways.add(group.ways);
+            self.done += values.iter().map(|values| values.len() / step).sum::<usize>();
+            counts.add(group.counts);
         }
         Ok(())
     }
@@ -366,10 +375,10 @@ impl Group {
             }
         });
         let pairs = block.pairs().map(|(ring, _)| 4 * ring.in_quadrant).sum();
-        self.ways.add(match way {
-            Way::Prefix(plan) => plan.ways(&block),
-            Way::Direct => Ways { direct: pairs, ..Ways::default() },
-            Way::Missed => Ways { missed: pairs, ..Ways::default() },
+        self.counts.add(match way {
+            Way::Prefix(plan) => plan.counts(&block),
+            Way::Direct => SummationCounts { direct: pairs, ..SummationCounts::default() },
+            Way::Missed => SummationCounts { missed: pairs, ..SummationCounts::default() },
         });
     }
 }
@@ -389,8 +398,8 @@ fn add_pixels(block: &Block<'_>, quadrant: usize, layout: &Layout, sums: &mut [S
     }
 }
 
-impl Ways {
-    fn add(&mut self, other: Ways) {
+impl SummationCounts {
+    fn add(&mut self, other: SummationCounts) {
         self.direct += other.direct;
         self.missed += other.missed;
         self.prefix += other.prefix;
@@ -409,8 +418,7 @@ fn visited<E>(
     columns: usize,
     visit: impl Fn(&mut [Moments], &mut [f64]) -> Result<(), E>,
 ) -> Result<Vec<f64>, E> {
-    // `columns` are those of all groups of thresholds.
-    let (groups, columns) = (layout.groups, columns / layout.groups);
+    let groups = layout.groups;
     let mut out = vec![0.0; ring.in_quadrant * groups * columns];
     let mut batch = vec![Moments::default(); (ring.in_quadrant * groups).min(BATCH)];
     for (number, out) in out.chunks_mut(BATCH * columns).enumerate() {

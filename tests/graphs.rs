@@ -27,18 +27,19 @@ fn a_threshold_among_many_is_as_it_is_alone() {
                     max_masked: 0.5,
                     ..Analysis::default()
                 };
-                let all = analysis.sequence(&map, &measures, |_| ()).unwrap();
+                let all = Analysis { by_threshold: true, ..analysis.clone() };
+                let all = all.minkowski_maps(&map, &measures, longan::go_on).unwrap().blocks;
                 assert_eq!(all.len(), 10);
                 for (i, maps) in all.iter().enumerate() {
                     let thresholds = Thresholds::new(vec![analysis.thresholds.values()[i % 5]]).unwrap();
                     assert_eq!((maps.window, &maps.thresholds), ([25.0, 0.0][i / 5], &thresholds));
                     let windows = vec![maps.window];
                     let alone = Analysis { thresholds, windows, ..analysis.clone() };
-                    let alone = alone.minkowski_maps(&map, &measures, |_| ()).unwrap();
-                    for (a, b) in maps.values.iter().zip(&alone[0].values) {
-                        assert_eq!(difference(a, b), 0.0, "{summation:?} {body:?} {i}");
+                    let alone = &alone.minkowski_maps(&map, &measures, longan::go_on).unwrap().blocks[0];
+                    for (a, b) in maps.values.rows().into_iter().zip(alone.values.rows()) {
+                        assert_eq!(difference(&a.to_vec(), &b.to_vec()), 0.0, "{summation:?} {body:?} {i}");
                     }
-                    assert_eq!(maps.ways, alone[0].ways);
+                    assert_eq!(maps.counts, alone.counts);
                 }
             }
         }

@@ -108,16 +108,15 @@ fn moments_by(
         radii: &[f64::to_radians(radius)],
         summation,
     }
-    .visit(
-        4 + 2 * 6,
-        |m, out| {
-            out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
-            m.psi.iter().enumerate().for_each(|(i, p)| out[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
-        },
-        |_| (),
-    )
+    .visit(4 + 2 * 6, |m, out| {
+        out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
+        m.psi.iter().enumerate().for_each(|(i, p)| out[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
+    })
     .remove(0)
-    .columns
+    .values[0]
+        .outer_iter()
+        .map(|row| row.to_vec())
+        .collect()
 }
 
 #[test]
@@ -209,7 +208,14 @@ fn thresholds_average() {
 
 fn analyse(threads: usize, map: &Map, analysis: &Analysis, measures: &[BuiltIn]) -> Vec<Vec<f64>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| analysis.minkowski_maps(map, measures, |_| ())).unwrap().remove(0).values
+    pool.install(|| analysis.minkowski_maps(map, measures, longan::go_on))
+        .unwrap()
+        .blocks
+        .remove(0)
+        .values
+        .outer_iter()
+        .map(|row| row.to_vec())
+        .collect::<Vec<_>>()
 }
 
 #[test]
@@ -238,7 +244,15 @@ fn masked_windows_are_masked_and_others_rescaled() {
     let with = |max_masked| {
         let analysis =
             Analysis { windows: vec![15.0], threshold_unit: ThresholdUnit::Sigma, max_masked, ..Analysis::default() };
-        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0).values
+        analysis
+            .minkowski_maps(&map, &measures, longan::go_on)
+            .unwrap()
+            .blocks
+            .remove(0)
+            .values
+            .outer_iter()
+            .map(|row| row.to_vec())
+            .collect::<Vec<_>>()
     };
     let (all, some) = (with(1.0), with(0.2));
     let fraction = &all[2];

@@ -76,7 +76,15 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     let column = |name: &str| &table.columns[name];
     let run = |names: &[&str]| {
         let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
-        analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0).values
+        analysis
+            .minkowski_maps(&map, &measures, longan::go_on)
+            .unwrap()
+            .blocks
+            .remove(0)
+            .values
+            .outer_iter()
+            .map(|row| row.to_vec())
+            .collect::<Vec<_>>()
     };
 
     let names = ["masked-fraction", "w0", "contour-length", "w1", "evq", "rank4-min", "rank4-mid", "rank4-max"];
@@ -133,7 +141,14 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     if table.columns.contains_key("litchi_evq") {
         let analysis = Analysis { max_masked: 1.0 / 16.0, ..analysis.clone() };
         check_litchi(&table, |name| {
-            analysis.minkowski_maps(&map, &[find(name).unwrap()], |_| ()).unwrap().remove(0).values.remove(0)
+            analysis
+                .minkowski_maps(&map, &[find(name).unwrap()], longan::go_on)
+                .unwrap()
+                .blocks
+                .remove(0)
+                .values
+                .row(0)
+                .to_vec()
         });
     }
 }
@@ -155,15 +170,11 @@ fn check_curvature(shared: &Path, name: &str, map: &Map, thresholds: &Thresholds
         radii: &[window.to_radians()],
         summation: Summation::Exact,
     };
-    let columns = windows.visit(
-        17,
-        |m, out| {
-            out[0] = m.curvature;
-            m.psi.iter().enumerate().for_each(|(i, p)| out[1 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
-        },
-        |_| (),
-    );
-    let columns = &columns[0].columns;
+    let columns = windows.visit(17, |m, out| {
+        out[0] = m.curvature;
+        m.psi.iter().enumerate().for_each(|(i, p)| out[1 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
+    });
+    let columns: Vec<Vec<f64>> = columns[0].values[0].outer_iter().map(|row| row.to_vec()).collect();
     close("w2", &columns[0], &table.columns["w2"]);
     for s in 1..=8 {
         for (i, part) in ["re", "im"].iter().enumerate() {
@@ -257,7 +268,15 @@ fn layouts_of_one_sky_agree() {
     let run = |file: &str| {
         let map = read(&shared.join("data").join(file));
         let measures = ["evq", "w0"].map(|n| find(n).unwrap());
-        Analysis::default().minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0).values
+        Analysis::default()
+            .minkowski_maps(&map, &measures, longan::go_on)
+            .unwrap()
+            .blocks
+            .remove(0)
+            .values
+            .outer_iter()
+            .map(|row| row.to_vec())
+            .collect::<Vec<_>>()
     };
     let (ring, nested) = (run("grf_nside128_ring_f64.fits"), run("grf_nside128_nested_f32.fits.gz"));
     for (a, b) in ring.iter().zip(&nested) {

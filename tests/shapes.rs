@@ -19,9 +19,9 @@ fn solid(shape: Shape, lon: f64, lat: f64, size: f64) -> Solid {
 /// Measures in the window about the output pixel that holds a place.
 fn there(map: &Map, analysis: &Analysis, names: &[&str], (lon, lat): (f64, f64)) -> Vec<f64> {
     let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
-    let maps = analysis.minkowski_maps(map, &measures, |_| ()).unwrap().remove(0);
+    let maps = analysis.minkowski_maps(map, &measures, longan::go_on).unwrap();
     let pixel = maps.grid.pixel_at((90.0 - lat).to_radians(), lon.to_radians());
-    maps.values.iter().map(|v| v[pixel]).collect()
+    maps.blocks[0].values.column(pixel).to_vec()
 }
 
 #[test]
@@ -89,9 +89,9 @@ fn a_great_circle_has_no_curvature_in_any_window() {
         let map = Map::new("", (0..grid.pixels()).map(height).collect()).unwrap();
         let measures = ["w2", "w1"].map(|name| find(name).unwrap());
         let analysis = Analysis { windows: vec![6.0], nside_out: Some(64), ..at(0.0) };
-        let maps = analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0);
-        assert!(maps.values[1].iter().filter(|length| **length > 0.1).count() > 1000);
-        maps.values[0].iter().fold(0.0, |worst: f64, w2| worst.max(w2.abs()))
+        let maps = analysis.minkowski_maps(&map, &measures, longan::go_on).unwrap();
+        assert!(maps["w1"].iter().filter(|length| **length > 0.1).count() > 1000);
+        maps["w2"].iter().fold(0.0, |worst: f64, w2| worst.max(w2.abs()))
     };
     for axis in [[0.48, -0.6, 0.64], [0.36, 0.48, 0.8], [-0.8, 0.6, 0.0], [0.28, 0.768, 0.576]] {
         for (nside, bound) in [(64, 5e-5), (128, 1.25e-5), (256, 3.2e-6)] {
@@ -176,8 +176,8 @@ fn the_curvature_of_a_smooth_ellipse_converges_to_its_closed_form() {
                 Analysis { windows: vec![50.0], weight: longan::Weight::Curvature, nside_out: Some(64), ..at(0.0) };
             let measures: Vec<BuiltIn> =
                 ["w2", "evq", "q1", "q2", "q3", "q4"].iter().map(|name| find(name).unwrap()).collect();
-            let maps = analysis.minkowski_maps(&map, &measures, |_| ()).unwrap().remove(0);
-            let got: Vec<f64> = maps.values.iter().map(|values| values[place]).collect();
+            let maps = analysis.minkowski_maps(&map, &measures, longan::go_on).unwrap();
+            let got = maps.blocks[0].values.column(place).to_vec();
             got.iter().zip(expected).map(|(got, want)| (got - want).abs()).fold(0.0, f64::max)
         };
         let [coarse, fine] = [64, 256].map(errors);

@@ -2,7 +2,7 @@
 
 use longan::contour::Field;
 use longan::moments::{Selection, Weight};
-use longan::window::{MovingWindows, Summation, Ways};
+use longan::window::{MovingWindows, Summation, SummationCounts};
 use longan::{Body, Healpix, Map, Thresholds};
 
 use longan_support::{masked, noise};
@@ -17,7 +17,7 @@ pub(crate) fn moments(
     radius: f64,
     summation: Summation,
     weight: Weight,
-) -> (Vec<Vec<f64>>, Ways) {
+) -> (Vec<Vec<f64>>, SummationCounts) {
     let selection = Selection {
         area: true,
         length: true,
@@ -35,20 +35,16 @@ pub(crate) fn moments(
         radii: &[f64::to_radians(radius)],
         summation,
     }
-    .visit(
-        4 + 2 * RANKS as usize,
-        |m, out| {
-            out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
-            m.psi.iter().enumerate().for_each(|(i, p)| out[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
-        },
-        |_| (),
-    );
+    .visit(4 + 2 * RANKS as usize, |m, out| {
+        out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
+        m.psi.iter().enumerate().for_each(|(i, p)| out[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
+    });
     let windows = all.remove(0);
-    (windows.columns, windows.ways)
+    (windows.values[0].outer_iter().map(|row| row.to_vec()).collect(), windows.counts)
 }
 
 /// Compares prefix sums with direct ones and tells how many pairs were summed from prefix sums.
-fn compare(map: &Map, output: usize, radius: f64, tolerance: f64, weight: Weight) -> Ways {
+fn compare(map: &Map, output: usize, radius: f64, tolerance: f64, weight: Weight) -> SummationCounts {
     let nside = map.grid().nside();
     let run = |summation| moments(map, &[2.0, 4.5], output, radius, summation, weight);
     let (exact, _) = run(Summation::Exact);

@@ -1,10 +1,10 @@
 //! `longan compare`: a Minkowski map of data against those of simulations.
 //!
-//! [`said`] reads headers and finds what does not go together, [`work`] makes Minkowski maps of raw maps, [`scatter`]
+//! [`provenance_reader`] reads headers and finds what does not go together, [`work`] makes Minkowski maps of raw maps, [`scatter`]
 //! looks at one pixel, [`report`] tells people and programs. The comparison itself is left to [`longan::compare`].
 
+mod provenance_reader;
 mod report;
-mod said;
 mod scatter;
 mod work;
 
@@ -15,22 +15,24 @@ use std::sync::Arc;
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use longan::ThresholdUnit;
-use longan::compare::{Ensemble, Rank, peaks};
-use longan::measures::Measure;
+use longan::compare::{Comparison, ComparisonError, Outcome, Outlier};
+use longan::measures::{Measure, Quantity};
 use longan::smoothing::Smoothing;
-use longan_formats::{self as formats, Card, Error};
+use longan_formats::{self as formats, Card};
 use longan_grid::Healpix;
+use ndarray::Array1;
 
-use super::jobs::Jobs;
 use super::mapping::Mapping;
 use super::mismatch::Together;
 use super::misused;
 use super::options::{Format, Running, between, check_apart, check_memory, print, shown, whole};
 use super::output::{command, creator, integer, numbered, real, text};
+use super::parallel::Jobs;
 use super::progress::Progress;
+use super::quantity::stated;
 use super::sink::{self, Kind, MapColumn, Step, Table};
+use provenance_reader::{Column, MadeFrom};
 use report::{OfMeasure, Region, Report};
-use said::{Column, Said};
 use scatter::{At, Scatter};
 
 /// Inputs whose spacings differ by less than this factor, as where a few points are missing, count as equally fine.
@@ -134,6 +136,9 @@ const WITHOUT_WORK: [&str; 19] = [
     "help",
 ];
 
+/// Takes the maps of one simulation.
+type Take<'a> = dyn FnMut(&[Vec<f64>]) -> Result<(), ComparisonError> + 'a;
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
     let scatter = arguments.checked()?;
@@ -142,7 +147,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(folder) => {
             let inputs: Vec<&Path> = arguments.inputs().collect();
             let measures = arguments.mapping.measures("compare")?;
-            let column = |measure: &Arc<dyn Measure>| Column::to_be(measure.column(), measure.unit());
+            let column =
+                |measure: &Arc<dyn Measure>| Column::to_be(measure.column(), measure.unit(), measure.quantity());
             let columns: Vec<Column> = measures.iter().map(column).collect();
             columns.iter().try_for_each(Column::check)?;
             arguments.check_together(&inputs)?;
@@ -171,76 +177,42 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let grid = Healpix::new(data.nside)?;
     check_memory(grid, 12 * columns.len())?;
     let smoothing = arguments.smooth.map(|fwhm| Smoothing::new(grid, fwhm)).transpose()?;
-    if let Some(other) = simulations.iter().find(|other| other.input_nside != data.input_nside) {
-        arguments.running.warn(format_args!(
-            "{} was measured at Nside {}, and {} at Nside {}; shapes depend on the resolution",
-            shown(&data.path),
-            data.input_nside,
-            shown(&other.path),
-            other.input_nside
-        ));
-    }
-
-    if let Some(other) = simulations.iter().find(|other| other.way.is_empty() != data.way.is_empty()) {
-        let said =
-            |file: &Said| if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) };
-        arguments.running.warn(format_args!(
-            "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
-            shown(&data.path),
-            said(data),
-            shown(&other.path),
-            said(other)
-        ));
-    }
-    let apart = |other: &&Said| match (data.ratio, other.ratio) {
-        (Some(one), Some(other)) => (one / other).ln().abs() > SAME_RATIO.ln(),
-        _ => false,
-    };
-    if let Some(other) = simulations.iter().find(apart) {
-        arguments.running.warn(format_args!(
-            "the input of {} has another spacing than that of {}; shapes depend on the resolution",
-            shown(&data.path),
-            shown(&other.path)
-        ));
-    }
-
+    arguments.warn_of_resolution(data, simulations);
     let first = data.read(&columns[0])?;
     let layout = arguments.mapping.layout().layout(&first, grid, kind, 1).with_context(|| shown(&data.path))?;
-    let read = |file: &Said| -> anyhow::Result<Vec<Vec<f64>>> {
+    let read = |file: &MadeFrom| -> anyhow::Result<Vec<Vec<f64>>> {
         let maps = columns.iter().map(|column| Ok(file.read(column)?.into_values()));
-        let maps = maps.collect::<Result<Vec<_>, Error>>()?;
+        let maps = maps.collect::<anyhow::Result<Vec<_>>>()?;
         let Some(smoothing) = &smoothing else { return Ok(maps) };
         let maps: Vec<&[f64]> = maps.iter().map(Vec::as_slice).collect();
         smoothing.apply(&maps).with_context(|| shown(&file.path))
     };
-    let mut ensembles: Vec<Ensemble> = read(data)?.into_iter().map(Ensemble::new).collect();
-    let mut points = Vec::new();
+    let of_data = read(data)?;
+    let comparisons = of_data.iter().map(Comparison::new).collect::<Result<Vec<_>, _>>();
+    let mut comparisons = comparisons.with_context(|| shown(&data.path))?;
+    let at_point = |maps: &[Vec<f64>]| Some(scatter.as_ref()?.point(grid, pair?.map(|i| maps[i].as_slice())));
+    let mut points: Vec<[f64; 2]> = at_point(&of_data).into_iter().collect();
     if let (Some(scatter), Some(pair)) = (&scatter, pair) {
-        points.push(scatter.point(grid, pair.map(|i| ensembles[i].data())));
         scatter.check_point(&data.path, grid, points[0], pair.map(|i| &columns[i]))?;
     }
     let progress = Progress::new(shown(&arguments.data), arguments.running.quiet);
-    let steps = 2 * simulations.len();
-    for (i, simulation) in simulations.iter().enumerate() {
-        let maps = read(simulation)?;
-        for (ensemble, map) in ensembles.iter_mut().zip(&maps) {
-            ensemble.add(map).with_context(|| shown(&simulation.path))?;
+    let pass = |done: usize, take: &mut Take<'_>| {
+        for (i, simulation) in simulations.iter().enumerate() {
+            take(&read(simulation)?).with_context(|| shown(&simulation.path))?;
+            progress.set((done + i + 1) as f64 / (2 * simulations.len()) as f64);
         }
-        if let (Some(scatter), Some(pair)) = (&scatter, pair) {
-            points.push(scatter.point(grid, pair.map(|i| maps[i].as_slice())));
-        }
-        progress.set((i + 1) as f64 / steps as f64);
-    }
+        anyhow::Ok(())
+    };
+    pass(0, &mut |maps| {
+        points.extend(at_point(maps));
+        comparisons.iter_mut().zip(maps).try_for_each(|(comparison, map)| comparison.first(map))
+    })?;
     if let Some(scatter) = &scatter {
         scatter.check_simulations(grid, &points[1..])?;
     }
-    let mut largest = vec![Vec::new(); columns.len()];
-    for (i, simulation) in simulations.iter().enumerate() {
-        for (j, map) in read(simulation)?.iter().enumerate() {
-            largest[j].push(ensembles[j].largest_left_out(map).with_context(|| shown(&simulation.path))?);
-        }
-        progress.set((simulations.len() + i + 1) as f64 / steps as f64);
-    }
+    pass(simulations.len(), &mut |maps| {
+        comparisons.iter_mut().zip(maps).try_for_each(|(comparison, map)| comparison.second(map))
+    })?;
     drop(progress);
 
     let mut report = Report {
@@ -254,17 +226,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         scatter: Vec::new(),
     };
     let mut maps = Vec::new();
-    for ((column, ensemble), largest) in columns.iter().zip(&ensembles).zip(largest) {
-        let (of, mut columns) = arguments.of_measure(grid, column, ensemble, largest);
+    for (column, comparison) in columns.iter().zip(comparisons) {
+        let (of, mut columns) = arguments.of_measure(column, comparison.finish()?);
         report.measures.push(of);
         maps.append(&mut columns);
     }
-    drop(ensembles);
     let step = arguments.step(data, &report, maps);
-    let mut step = Some(step);
-    sink::write(&arguments.output, kind, layout, arguments.overwrite, |_| {
-        step.take().ok_or_else(|| Error::NoResult { reason: "there is but one step".to_owned() })
-    })?;
+    sink::write(&arguments.output, kind, layout, arguments.overwrite, [Ok(step)])?;
     if let (Some(scatter), Some(pair)) = (&scatter, pair) {
         let files: Vec<&Path> = arguments.inputs().collect();
         report.scatter = scatter.write(&files, &points, pair.map(|i| &columns[i]), arguments.overwrite)?;
@@ -323,6 +291,43 @@ impl Arguments {
         Ok(scatter)
     }
 
+    /// Warns where the maps measured had another resolution, or came to HEALPix in another way.
+    fn warn_of_resolution(&self, data: &MadeFrom, simulations: &[MadeFrom]) {
+        if let Some(other) = simulations.iter().find(|other| other.input_nside != data.input_nside) {
+            self.running.warn(format_args!(
+                "{} was measured at Nside {}, and {} at Nside {}; shapes depend on the resolution",
+                shown(&data.path),
+                data.input_nside,
+                shown(&other.path),
+                other.input_nside
+            ));
+        }
+
+        if let Some(other) = simulations.iter().find(|other| other.way.is_empty() != data.way.is_empty()) {
+            let said = |file: &MadeFrom| {
+                if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) }
+            };
+            self.running.warn(format_args!(
+                "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
+                shown(&data.path),
+                said(data),
+                shown(&other.path),
+                said(other)
+            ));
+        }
+        let apart = |other: &&MadeFrom| match (data.ratio, other.ratio) {
+            (Some(one), Some(other)) => (one / other).ln().abs() > SAME_RATIO.ln(),
+            _ => false,
+        };
+        if let Some(other) = simulations.iter().find(apart) {
+            self.running.warn(format_args!(
+                "the input of {} has another spacing than that of {}; shapes depend on the resolution",
+                shown(&data.path),
+                shown(&other.path)
+            ));
+        }
+    }
+
     /// Refuses maps that do not go together, before they are measured.
     fn check_together(&self, inputs: &[&Path]) -> anyhow::Result<()> {
         let (mapping, input) = (&self.mapping, self.mapping.input());
@@ -331,10 +336,11 @@ impl Arguments {
         inputs.iter().try_for_each(|path| together.add(path, &input.open(path)?.about()))
     }
 
-    /// What the files say of themselves: Minkowski maps, all of them.
-    fn said(&self) -> anyhow::Result<Vec<Said>> {
+    /// The provenance of all files, each of which holds Minkowski maps.
+    fn said(&self) -> anyhow::Result<Vec<MadeFrom>> {
         let hdu = self.mapping.input().hdu;
-        let said = self.inputs().map(|path| Ok((path, Said::of(path, hdu)?))).collect::<anyhow::Result<Vec<_>>>()?;
+        let said =
+            self.inputs().map(|path| Ok((path, MadeFrom::of(path, hdu)?))).collect::<anyhow::Result<Vec<_>>>()?;
         if let Some((path, _)) = said.iter().find(|(_, said)| said.is_none()) {
             match said.iter().find(|(_, said)| said.is_some()) {
                 Some((other, _)) => bail!(
@@ -352,13 +358,13 @@ impl Arguments {
     }
 
     /// The columns to compare: those asked for, or those that all files have.
-    fn columns(&self, files: &[Said]) -> anyhow::Result<Vec<Column>> {
+    fn columns(&self, files: &[MadeFrom]) -> anyhow::Result<Vec<Column>> {
         let data = &files[0];
         let lacking = |column: &Column| files.iter().find(|file| !file.has(column));
         let asked: Vec<&str> = if self.work.is_some() { Vec::new() } else { self.mapping.names().collect() };
         let mut columns = Vec::new();
         for name in &asked {
-            let missing = |file: &Said| {
+            let missing = |file: &MadeFrom| {
                 format!("{}: there is no measure '{name}'; there are {}", shown(&file.path), file.listed())
             };
             let mut called = data.columns.iter().filter(|column| column.is_called(name)).peekable();
@@ -382,7 +388,7 @@ impl Arguments {
                 Some(file) => {
                     left_out.push(format!("{}: {} has only {}", column.name, shown(&file.path), file.listed()));
                 }
-                None if column.is_direction() => {
+                None if !column.quantity.has_mean() => {
                     left_out.push(format!("{}: it is an angle, of which there is no mean or order", column.name));
                 }
                 None => columns.push(column.clone()),
@@ -409,63 +415,48 @@ impl Arguments {
         Ok(columns)
     }
 
-    /// What is reported of a measure, and its maps.
-    fn of_measure(
-        &self,
-        grid: Healpix,
-        column: &Column,
-        ensemble: &Ensemble,
-        largest: Vec<Option<f64>>,
-    ) -> (OfMeasure, Vec<MapColumn>) {
-        let found = ensemble.deviation();
-        let rank = ensemble.largest().map(|data| Rank::new(data, largest));
+    /// The report of a measure, and its maps.
+    fn of_measure(&self, column: &Column, outcome: Outcome<'_>) -> (OfMeasure, Vec<MapColumn>) {
         let window = column.window.unwrap_or(0.0);
-        let regions = peaks(grid, &found.sigma, 2.0 * window, self.level, self.regions);
-        let regions = regions.iter().map(|peak| Region {
-            lon_deg: peak.lon,
-            lat_deg: peak.lat,
-            pixel: peak.pixel,
-            value: ensemble.data()[peak.pixel],
-            mean: found.mean[peak.pixel],
-            standard_deviation: found.std[peak.pixel],
-            sigma: peak.sigma,
-            local_percentile: found.local_percentile[peak.pixel],
-            global_percentile: found.global_percentile[peak.pixel],
-            simulations: found.count[peak.pixel] as usize,
-        });
+        let outliers = outcome.outliers(2.0 * window, self.level, self.regions);
         let of = OfMeasure {
             measure: column.name.clone(),
             unit: column.unit.clone(),
             window_deg: window,
-            largest_sigma: ensemble.largest(),
-            simulations_as_large: rank.map(|rank| rank.as_large),
-            p_value: rank.map(|rank| rank.p_value()),
-            regions: regions.collect(),
+            largest_sigma: outcome.largest,
+            simulations_as_large: outcome.rank.map(|rank| rank.as_large),
+            p_value: outcome.rank.map(|rank| rank.p_value()),
+            regions: outliers.iter().map(region).collect(),
         };
-        let map = |suffix: &str, unit: &str, words: &str, values: Vec<f64>| MapColumn {
+        let found = outcome.deviation;
+        let map = |suffix: &str, unit: &str, words: &str, quantity: Quantity, values: Array1<f64>| MapColumn {
             name: format!("{}_{suffix}", column.name),
             unit: unit.to_owned(),
             long_name: format!("{words} of {}", column.name),
-            values,
+            quantity: Some(stated(quantity)),
+            values: values.into_raw_vec_and_offset().0,
         };
+        let (lower_here, lower) =
+            ("share of simulations with a lower value here", "share of pixels of all simulations with a lower value");
         let maps = vec![
-            map("MEAN", &column.unit, "mean over simulations", found.mean),
-            map("STD", &column.unit, "standard deviation over simulations (n - 1)", found.std),
-            map("SIGMA", "", "data less mean, in standard deviations, of simulations", found.sigma),
-            map("LOCAL_PERCENTILE", "percent", "share of simulations with a lower value here", found.local_percentile),
+            map("MEAN", &column.unit, "mean over simulations", column.quantity, found.mean),
+            map("STD", &column.unit, "standard deviation over simulations (n - 1)", column.quantity, found.std),
             map(
-                "GLOBAL_PERCENTILE",
-                "percent",
-                "share of pixels of all simulations with a lower value",
-                found.global_percentile,
+                "SIGMA",
+                "",
+                "data less mean, in standard deviations, of simulations",
+                Quantity::Deviation,
+                found.sigma,
             ),
-            map("COUNT", "", "number of unmasked simulations", found.count),
+            map("LOCAL_PERCENTILE", "percent", lower_here, Quantity::Percentile, found.local_percentile),
+            map("GLOBAL_PERCENTILE", "percent", lower, Quantity::Percentile, found.global_percentile),
+            map("COUNT", "", "number of unmasked simulations", Quantity::Count, found.count),
         ];
         (of, maps)
     }
 
-    /// What is written.
-    fn step(&self, data: &Said, report: &Report, columns: Vec<MapColumn>) -> Step {
+    /// The maps and headers to write.
+    fn step(&self, data: &MadeFrom, report: &Report, columns: Vec<MapColumn>) -> Step {
         let command = command(&self.simulations, &self.simulations[0]);
         let mut cards: Vec<Card> = vec![
             creator(),
@@ -489,6 +480,22 @@ impl Arguments {
         cards.push(text("COMMAND", command, "command that made this file, but for simulations"));
         let table = Table { name: "DEVIATION".to_owned(), cards, columns };
         Step { time: None, tables: vec![table], attributes, numbers: Vec::new() }
+    }
+}
+
+/// The row of an outlier.
+fn region(outlier: &Outlier) -> Region {
+    Region {
+        lon_deg: outlier.peak.lon,
+        lat_deg: outlier.peak.lat,
+        pixel: outlier.peak.pixel,
+        value: outlier.value,
+        mean: outlier.mean,
+        standard_deviation: outlier.std,
+        sigma: outlier.peak.sigma,
+        local_percentile: outlier.local_percentile,
+        global_percentile: outlier.global_percentile,
+        simulations: outlier.simulations,
     }
 }
 

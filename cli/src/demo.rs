@@ -5,15 +5,16 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Args;
+use longan::gaussian::Gaussian;
 use longan::measures::{BuiltIn, find};
 use longan::simulate::{Edge, Waves, scene, shapes};
-use longan::{Analysis, Healpix, Map, MinkowskiMaps, ThresholdUnit};
+use longan::{Analysis, Body, Healpix, Map, MinkowskiMaps, ThresholdUnit, go_on};
 use longan_formats as formats;
 use longan_picture::{Options, Panel, panels};
 
-use super::drawn::save;
 use super::options::{Running, shown};
 use super::output::Provenance;
+use super::picture_format::save;
 use super::simulate::{self, step, waves_cards};
 use super::sink::Step;
 
@@ -57,15 +58,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         nside_out: Some(NSIDE_OUT),
         ..Analysis::default()
     };
-    let maps = analysis.minkowski_maps(&bodies, &evq, |_| ())?.remove(0);
+    let maps = analysis.minkowski_maps(&bodies, &evq, go_on)?;
     say(format!("Bodies of 4 to 6 degrees at Nside {}, EVQ in a window of 6 degrees about their middle:", NSIDE[0]))?;
     for (name, longitude, sides) in [("square", -135.0, 1), ("2:1 rectangle", -90.0, 2), ("3:1 rectangle", -45.0, 3)] {
         let pixel = maps.grid.pixel_at(std::f64::consts::FRAC_PI_2, f64::to_radians(longitude));
-        say(format!("  {name:<14} {:.3}   (ratio of its sides: {sides})", maps.values[0][pixel]))?;
+        say(format!("  {name:<14} {:.3}   (ratio of its sides: {sides})", maps["evq"][pixel]))?;
     }
     let (_, totals, _) = analysis.totals(&bodies)?;
     say(format!("  Euler characteristic {:.6}   (seven bodies, no holes)", totals[0].euler_characteristic()))?;
-    write("shapes_evq.fits", maps.grid, minkowski(maps, &bodies, "shapes.fits", &analysis, &evq))?;
+    write("shapes_evq.fits", maps.grid, minkowski(&maps, &bodies, "shapes.fits", &analysis, &evq))?;
 
     let (correlation, seed) = FIELD;
     let waves = Waves::new(correlation, seed)?;
@@ -73,23 +74,21 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     write("waves.fits", field.grid(), step(&field, waves_cards(&waves, correlation, seed)))?;
     let analysis = Analysis { nside_out: Some(NSIDE_OUT), ..Analysis::default() };
     let start = Instant::now();
-    let maps = analysis.minkowski_maps(&field, &evq, |_| ())?.remove(0);
+    let maps = analysis.minkowski_maps(&field, &evq, go_on)?;
     let seconds = start.elapsed().as_secs_f64();
     let (thresholds, totals, _) = analysis.totals(&field)?;
     say(format!("\nGaussian field of correlation angle {correlation} degrees at Nside {}:", NSIDE[1]))?;
     say("  threshold   length [rad]   expected   Euler characteristic".to_owned())?;
+    // The mean of the ensemble.
+    let gaussian = Gaussian { mean: 0.0, sigma0: waves.sigma0(), sigma1: waves.sigma1() };
     for (threshold, t) in thresholds.values().iter().zip(&totals).step_by(2) {
-        // Length per area of a Gaussian field: (σ1/σ0)/(2√2) e^{−ν²/2}; the mean of the ensemble.
-        let nu = threshold / waves.sigma0();
-        let slope = waves.sigma1() / waves.sigma0();
-        let expected = 4.0 * std::f64::consts::PI * slope / (2.0 * 2f64.sqrt()) * (-nu * nu / 2.0).exp();
+        let expected = 4.0 * std::f64::consts::PI * gaussian.per_area(*threshold, Body::Above).length;
         let euler = t.euler_characteristic();
         say(format!("  {threshold:>9.4} {:>14.4} {expected:>10.4} {euler:>18.6}", t.length))?;
     }
     say(format!("  Minkowski map of Nside {NSIDE_OUT}: {seconds:.2} s"))?;
 
-    let evq_values = maps.values[0].clone();
-    write("waves_evq.fits", maps.grid, minkowski(maps, &field, "waves.fits", &analysis, &evq))?;
+    write("waves_evq.fits", maps.grid, minkowski(&maps, &field, "waves.fits", &analysis, &evq))?;
     let top = Options {
         title: "Gaussian field".to_owned(),
         label: "value in σ".to_owned(),
@@ -102,14 +101,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         width: 1000,
         ..Options::default()
     };
-    let both = [Panel { values: field.values(), options: top }, Panel { values: &evq_values, options: bottom }];
+    let both = [Panel { values: field.values(), options: top }, Panel { values: &maps["evq"], options: bottom }];
     let png = panels(&both, 1)?.png()?;
     save(&path("waves_evq.png"), arguments.overwrite, &png)?;
     say(format!("\nMaps and the picture waves_evq.png are in {}", shown(folder)))
 }
 
 /// What is written of Minkowski maps.
-fn minkowski(maps: MinkowskiMaps, map: &Map, name: &str, analysis: &Analysis, measures: &[BuiltIn]) -> Step {
+fn minkowski(maps: &MinkowskiMaps, map: &Map, name: &str, analysis: &Analysis, measures: &[BuiltIn]) -> Step {
     let command = "longan demo".to_owned();
-    Provenance { path: name.as_ref(), map, input: None, analysis, command }.step(vec![maps], measures)
+    Provenance { path: name.as_ref(), map, input: None, analysis, command }.step(maps, measures)
 }

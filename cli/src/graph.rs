@@ -1,35 +1,32 @@
 //! `longan graph`: measures against threshold, as a table and as a picture.
 
-mod ensemble;
 mod picture;
 mod table;
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use clap::Args;
 use longan::gaussian::Gaussian;
-use longan::measures::{Measure, split, usual};
+use longan::graph::{Curves, Density, Graph, GraphError, Ordinate, standard_thresholds};
+use longan::measures::split;
 use longan::region::RegionError;
-use longan::statistics::Statistics;
-use longan::totals::Totals;
-use longan::{Analysis, AnalysisError, Body, Map, Region, ThresholdUnit};
+use longan::{Analysis, Map, Region, ThresholdUnit};
 use longan_formats as formats;
 use longan_picture::axes::PALETTE;
 
-use super::drawn::{Form, save};
-use super::input::{Input, Mask, of};
+use super::input::{Input, Mask};
 use super::mapping::{find, no_measure};
 use super::mismatch::Together;
 use super::options::{
     BodyOptions, ContourOption, Running, WeightOption, between, check_apart, check_memory, nside, shown,
 };
+use super::picture_format::{Form, save};
 use super::plugin::Plugins;
 use super::progress::Progress;
 use super::{mismatch, misused, regridding};
-use ensemble::Ensemble;
 
 /// Measures of shape against threshold: a picture, and the numbers as CSV beside it.
 ///
@@ -108,9 +105,6 @@ pub(crate) struct Arguments {
     running: Running,
 }
 
-/// Thresholds where none are given, in standard deviations.
-const THRESHOLDS: &str = "-4:4:33";
-
 /// Simulations without which the ends of the band of 95 % are but the extremes.
 const FEWEST: usize = 40;
 
@@ -118,80 +112,24 @@ fn region(text: &str) -> Result<Region, RegionError> {
     text.parse()
 }
 
-/// What is drawn of a map.
-struct Quantity {
-    name: String,
-    kind: Kind,
-}
-
-enum Kind {
-    /// Of the body as a whole, per area.
-    Density(Density),
-    /// The mean in moving windows of the measure of this number.
-    Mean(usize),
-}
-
-/// Additive measures per area.
-#[derive(Clone, Copy)]
-struct Density {
-    name: &'static str,
-    title: &'static str,
-    unit: &'static str,
-    of: fn(&Totals) -> f64,
-}
-
-const DENSITIES: [Density; 4] = [
-    Density { name: "w0", title: "area fraction W₀/A", unit: "", of: |t| t.area },
-    Density { name: "w1", title: "contour length W₁/A", unit: "rad/sr", of: |t| t.length },
-    Density { name: "w2", title: "curvature W₂/A", unit: "rad/sr", of: |t| t.curvature },
-    Density { name: "euler", title: "Euler characteristic χ/A", unit: "1/sr", of: Totals::euler_characteristic },
-];
-
-/// What the files are searched for.
-struct Plan {
-    quantities: Vec<Quantity>,
-    measures: Vec<Arc<dyn Measure>>,
-    analysis: Analysis,
-    region: Option<Region>,
-    gaussian: bool,
-}
-
-/// One map's curves.
-struct Curves {
-    /// Its file.
+/// The curves of one map, with what is said of the map.
+struct MapCurves {
+    /// The file of the map.
     path: PathBuf,
-    /// Its time, where it has one.
+    /// The time of the map, where it has one.
     time: Option<String>,
-    /// Its unit.
+    /// The unit of the map.
     unit: Option<String>,
-    of_map: Statistics,
-    /// Thresholds in the map's unit.
-    thresholds: Vec<f64>,
-    /// The area of what is not masked, in steradian; where a density is asked for.
-    area: Option<f64>,
-    /// For each quantity its values.
-    values: Vec<Vec<Value>>,
-    gaussian: Option<Gaussian>,
-}
-
-/// A value at a threshold.
-#[derive(Clone, Copy)]
-struct Value {
-    /// NaN where it is not defined.
-    value: f64,
-    /// The number of windows that it is the mean of.
-    windows: Option<usize>,
-    /// What a Gaussian field has.
-    gaussian: Option<f64>,
+    curves: Curves,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let start = Instant::now();
     arguments.running.start()?;
-    let plan = arguments.plan()?;
+    let graph = arguments.graph()?;
     let outputs = arguments.outputs()?;
     let mask = arguments.input.mask(&arguments.running)?;
-    let mut together = Together::new(!arguments.input.ignore_coordsys, !plan.in_sigma());
+    let mut together = Together::new(!arguments.input.ignore_coordsys, !in_sigma(&graph));
     let curves = arguments.maps_in(&arguments.inputs, mask.as_ref(), &mut together)?;
     let simulations = arguments.maps_in(&arguments.ensemble, mask.as_ref(), &mut together)?;
     let all = curves + simulations;
@@ -215,91 +153,78 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let progress = Progress::new(shown(&arguments.output), arguments.running.quiet);
     let told = regridding::Said::default();
     let mut done = 0;
-    let mut all_of = |files: &[PathBuf], keep: &mut dyn FnMut(Curves)| -> anyhow::Result<()> {
-        for path in files {
-            let mut series = arguments.input.open(path)?;
-            for step in 0..series.steps() {
-                let share = |share: f64| progress.set((done as f64 + share) / all as f64);
-                let map = series.read(step, mask.as_ref())?;
-                if step == 0 {
-                    told.say(&arguments.running, path, &map);
+    let mut all_of =
+        |files: &[PathBuf], keep: &mut dyn FnMut(MapCurves) -> Result<(), GraphError>| -> anyhow::Result<()> {
+            for path in files {
+                let mut series = arguments.input.open(path)?;
+                for step in 0..series.steps() {
+                    let share = |share: f64| progress.set((done as f64 + share) / all as f64);
+                    let map = series.read(step, mask.as_ref())?;
+                    if step == 0 {
+                        told.say(&arguments.running, path, &map);
+                    }
+                    if let Some(curves) = arguments.one(&graph, path, &map, series.steps(), share)? {
+                        keep(curves)?;
+                    }
+                    done += 1;
+                    progress.set(done as f64 / all as f64);
                 }
-                if let Some(curves) = arguments.one(&plan, path, &map, series.steps(), share)? {
-                    keep(curves);
-                }
-                done += 1;
-                progress.set(done as f64 / all as f64);
             }
-        }
-        Ok(())
-    };
+            Ok(())
+        };
     let mut data = Vec::new();
-    all_of(&arguments.inputs, &mut |curves| data.push(curves))?;
-    let mut ensemble = (simulations > 0).then(Ensemble::default);
-    all_of(&arguments.ensemble, &mut |curves| ensemble.iter_mut().for_each(|ensemble| ensemble.add(&curves)))?;
+    all_of(&arguments.inputs, &mut |curves| {
+        data.push(curves);
+        Ok(())
+    })?;
+    let mut ensemble = (simulations > 0).then(|| graph.ensemble());
+    all_of(&arguments.ensemble, &mut |map| ensemble.iter_mut().try_for_each(|ensemble| ensemble.add(&map.curves)))?;
     drop(progress);
     ensure!(!data.is_empty(), "{}: every map is masked or constant", shown(&arguments.inputs[0]));
-    let ensemble = ensemble.map(Ensemble::sorted);
 
-    let table = table::csv(&plan, &data, ensemble.as_ref())?;
+    let table = table::csv(&graph, &data, ensemble.as_ref())?;
     let picture = match &outputs.picture {
-        Some((_, form)) => Some(form.bytes(&picture::draw(&plan, &data, ensemble.as_ref())?)?),
+        Some((_, form)) => Some(form.bytes(&picture::draw(&graph, &data, ensemble.as_ref())?)?),
         None => None,
     };
     outputs.save(&table, picture.as_deref(), arguments.overwrite)?;
-    arguments.report(&plan, &data, &outputs, start)
+    arguments.report(&graph, &data, &outputs, start)
 }
 
 impl Arguments {
-    /// What is to be done, after all checks of the arguments.
-    fn plan(&self) -> anyhow::Result<Plan> {
+    /// The graph that the arguments ask for.
+    fn graph(&self) -> anyhow::Result<Graph> {
         let catalogue = self.plugins.catalogue()?;
-        let (mut quantities, mut measures) = (Vec::<Quantity>::new(), Vec::new());
         let mut texts: Vec<&str> = self.measure.iter().flat_map(|list| split(list)).collect();
         if texts.is_empty() {
-            texts.extend(DENSITIES.map(|density| density.name));
+            texts.extend(Density::ALL.map(Density::name));
         }
+        let mut graph = Graph::default();
+        (graph.region, graph.gaussian) = (self.region, self.gaussian);
         for text in texts {
-            let density = DENSITIES.into_iter().find(|density| density.name == usual(text));
-            let quantity = match density {
-                Some(density) => Quantity { name: density.name.to_owned(), kind: Kind::Density(density) },
-                None => {
-                    let measure = find(&catalogue, text, "graph")?;
-                    let name = measure.name();
-                    if name.ends_with("-direction") {
-                        let problem = "directions count from the south of each place, so that a mean of them means \
-                                       nothing; take a formula such as 'x = psi2.re/psi0.re'";
-                        return Err(no_measure(text, problem, "graph"));
-                    }
-                    // Beside the measure per area of the same name.
-                    let twin = DENSITIES.iter().any(|density| density.name == name);
-                    measures.push(measure);
-                    let name = if twin { format!("longan:{name}") } else { name };
-                    Quantity { name, kind: Kind::Mean(measures.len() - 1) }
-                }
+            let ordinate = match Density::named(text) {
+                Some(density) => Ordinate::Density(density),
+                None => Ordinate::Mean(find(&catalogue, text, "graph")?),
             };
-            if quantities.iter().any(|other| other.name.eq_ignore_ascii_case(&quantity.name)) {
-                return Err(no_measure(text, format!("'{}' is given twice", quantity.name), "graph"));
-            }
-            quantities.push(quantity);
+            graph.add(ordinate).map_err(|problem| no_measure(text, problem, "graph"))?;
         }
-        let densities = quantities.iter().any(|quantity| matches!(quantity.kind, Kind::Density(_)));
-        if self.gaussian && !densities {
+        if self.gaussian && graph.ordinates().iter().all(|ordinate| ordinate.measure().is_some()) {
             let problem = "--gaussian is about w0, w1, w2 and euler, and none of these is asked for";
             return Err(misused("graph", problem.to_owned()));
         }
-        let mut analysis = Analysis {
+        graph.analysis = Analysis {
             windows: vec![self.window],
             nside_out: self.nside_out,
             max_masked: self.max_masked,
             min_contour: self.contour.min_contour,
             weight: self.weight.weight(),
+            by_threshold: true,
             ..self.body.analysis()
         };
         if self.body.thresholds.is_none() {
-            analysis.thresholds = THRESHOLDS.parse()?;
+            graph.analysis.thresholds = standard_thresholds();
         }
-        Ok(Plan { quantities, measures, analysis, region: self.region, gaussian: self.gaussian })
+        Ok(graph)
     }
 
     /// The files to write, once it is clear that they can be.
@@ -331,7 +256,7 @@ impl Arguments {
         for path in paths {
             let series = self.input.open(path)?;
             let about = series.about();
-            mask.map_or(Ok(()), |mask| mask.check(&about)).map_err(|problem| of(path, problem))?;
+            mask.map_or(Ok(()), |mask| mask.check(path, &about))?;
             together.add(path, &about)?;
             maps += series.steps();
         }
@@ -341,158 +266,69 @@ impl Arguments {
     /// The curves of one map; nothing, with a warning, of one among several steps that has nothing to measure.
     fn one(
         &self,
-        plan: &Plan,
+        graph: &Graph,
         path: &Path,
         map: &Map,
         steps: usize,
-        told: impl FnMut(f64),
-    ) -> anyhow::Result<Option<Curves>> {
+        mut told: impl FnMut(f64),
+    ) -> anyhow::Result<Option<MapCurves>> {
         let several = self.inputs.len() + self.ensemble.len() > 1 || steps > 1;
-        mismatch::warn(&self.running, path, map, &plan.analysis, several);
-        let curves = match plan.curves(path, map, told) {
-            Err(error) if steps > 1 && nothing_to_measure(&error) => {
-                let when = map.time.as_ref().map(|time| time.label.as_str()).unwrap_or_default();
-                self.running.warn(format_args!("{}: at {when}: {error}", shown(path)));
-                None
-            }
-            curves => Some(curves.with_context(|| shown(path))?),
+        mismatch::warn(&self.running, path, map, &graph.analysis, several);
+        let time = map.time.as_ref().map(|time| time.label.clone());
+        let mut curves = || {
+            let grid = graph.check(map.grid())?;
+            let means = graph.ordinates().iter().filter(|ordinate| ordinate.measure().is_some()).count();
+            check_memory(grid, graph.analysis.thresholds.values().len() * means)?;
+            let told = |share| {
+                told(share);
+                ControlFlow::Continue(())
+            };
+            Ok(graph.curves(map, told)?)
         };
-        Ok(curves)
+        match curves() {
+            Err(error) if steps > 1 && has_nothing(&error) => {
+                self.running.warn(format_args!("{}: at {}: {error}", shown(path), time.unwrap_or_default()));
+                Ok(None)
+            }
+            curves => {
+                let curves = curves.with_context(|| shown(path))?;
+                Ok(Some(MapCurves { path: path.to_owned(), time, unit: map.unit.clone(), curves }))
+            }
+        }
     }
 
     /// Says what was done.
-    fn report(&self, plan: &Plan, data: &[Curves], outputs: &Outputs, start: Instant) -> anyhow::Result<()> {
-        for curves in data {
-            if let Some(Gaussian { mean, sigma0, sigma1 }) = curves.gaussian {
+    fn report(&self, graph: &Graph, data: &[MapCurves], outputs: &Outputs, start: Instant) -> anyhow::Result<()> {
+        for map in data {
+            if let Some(Gaussian { mean, sigma0, sigma1 }) = map.curves.gaussian {
                 self.running.say(format_args!(
                     "{}: mean {mean}, sigma0 {sigma0} of the pixels, sigma1 {sigma1} per radian from finite differences \
                      between them",
-                    curves.label()
+                    map.label()
                 ))?;
             }
         }
-        let names: Vec<&str> = plan.quantities.iter().map(|quantity| quantity.name.as_str()).collect();
+        let names: Vec<String> = graph.ordinates().iter().map(Ordinate::name).collect();
         let files = outputs.picture.iter().map(|(path, _)| path).chain([&outputs.table]);
         let files: Vec<String> = files.map(|path| shown(path)).collect();
-        let thresholds = plan.analysis.thresholds.values().len();
+        let thresholds = graph.analysis.thresholds.values().len();
         let seconds = start.elapsed().as_secs_f64();
         let what = format!("{} at {thresholds} thresholds", names.join(", "));
         self.running.say(format_args!("{}: {what} ({seconds:.2} s)", files.join(", ")))
     }
 }
 
-/// Whether a map is such that other steps of its file may have something to measure.
-fn nothing_to_measure(error: &anyhow::Error) -> bool {
-    let of_analysis = error.downcast_ref::<AnalysisError>();
-    matches!(of_analysis, Some(AnalysisError::AllMasked | AnalysisError::Constant { .. })) || error.is::<Nothing>()
+/// Whether a map has nothing to measure, while other steps of its file may have.
+fn has_nothing(error: &anyhow::Error) -> bool {
+    error.downcast_ref().is_some_and(GraphError::is_of_map)
 }
 
-/// Why a map has no curves.
-#[derive(Debug, thiserror::Error)]
-enum Nothing {
-    #[error("all that lies in the region is masked; choose another one")]
-    Masked,
-    #[error("no window's centre lies in the region; enlarge it, or choose a larger --nside-out")]
-    NoWindow,
-    #[error("no pixel's centre lies in the region; enlarge it")]
-    NoPixel,
-    #[error("the map has no scatter, or no two neighbouring pixels to find sigma1 from, for --gaussian")]
-    NoGaussian,
+/// Whether thresholds are counted in standard deviations.
+fn in_sigma(graph: &Graph) -> bool {
+    graph.analysis.threshold_unit == ThresholdUnit::Sigma
 }
 
-impl Plan {
-    /// The curves of a map: one march for all densities, and one for all windows.
-    fn curves(&self, path: &Path, map: &Map, told: impl FnMut(f64)) -> anyhow::Result<Curves> {
-        let analysis = &self.analysis;
-        let grid = analysis.check(map.grid())?;
-        let (thresholds, of_map) = analysis.thresholds_of(map)?;
-        let thresholds = thresholds.values().to_vec();
-        let densities = self.quantities.iter().any(|quantity| matches!(quantity.kind, Kind::Density(_)));
-        let mut centres = Vec::new();
-        if !self.measures.is_empty() {
-            check_memory(grid, thresholds.len() * self.measures.len())?;
-            centres = match &self.region {
-                Some(region) => region.pixels(grid),
-                None => vec![true; grid.pixels()],
-            };
-            ensure!(centres.contains(&true), Nothing::NoWindow);
-        }
-        let gaussian = match self.gaussian {
-            true => Some(Gaussian::of(map).ok_or(Nothing::NoGaussian)?),
-            false => None,
-        };
-        let expected: Vec<Totals> = match &gaussian {
-            Some(gaussian) => thresholds.iter().map(|t| gaussian.per_area(*t, analysis.body)).collect(),
-            None => Vec::new(),
-        };
-        let (mut area, mut per_area) = (None, Vec::new());
-        if densities {
-            let (_, regional) = analysis.totals_within(map, self.region.as_ref())?;
-            ensure!(regional.unmasked + regional.masked > 0.0, Nothing::NoPixel);
-            ensure!(regional.unmasked > 0.0, Nothing::Masked);
-            per_area = regional.made_up().iter().map(|totals| totals.per_area(regional.unmasked)).collect();
-            area = Some(regional.unmasked);
-        }
-        let maps = match self.measures.is_empty() {
-            true => Vec::new(),
-            false => analysis.sequence(map, &self.measures, told)?,
-        };
-        let values = |quantity: &Quantity| -> Vec<Value> {
-            let of = |t: usize| match &quantity.kind {
-                Kind::Density(density) => {
-                    let gaussian = expected.get(t).map(density.of);
-                    Value { value: (density.of)(&per_area[t]), windows: None, gaussian }
-                }
-                Kind::Mean(measure) => {
-                    let (value, windows) = maps[t].mean(*measure, &centres);
-                    Value { value, windows: Some(windows), gaussian: None }
-                }
-            };
-            (0..thresholds.len()).map(of).collect()
-        };
-        Ok(Curves {
-            path: path.to_owned(),
-            time: map.time.as_ref().map(|time| time.label.clone()),
-            unit: map.unit.clone(),
-            of_map,
-            area,
-            values: self.quantities.iter().map(values).collect(),
-            thresholds,
-            gaussian,
-        })
-    }
-
-    /// Whether thresholds are counted in standard deviations.
-    fn in_sigma(&self) -> bool {
-        self.analysis.threshold_unit == ThresholdUnit::Sigma
-    }
-
-    /// The unit of a quantity.
-    fn unit(&self, quantity: &Quantity) -> &str {
-        match &quantity.kind {
-            Kind::Density(density) => density.unit,
-            Kind::Mean(measure) => self.measures[*measure].unit(),
-        }
-    }
-
-    fn body(&self) -> &'static str {
-        match self.analysis.body {
-            Body::Above => "above",
-            Body::Below => "below",
-        }
-    }
-}
-
-impl Curves {
-    /// A threshold in standard deviations from the mean, as it was given if so; nothing where there is no scatter.
-    fn in_sigma(&self, plan: &Plan, threshold: usize) -> Option<f64> {
-        let Statistics { mean, sigma, .. } = self.of_map;
-        if plan.in_sigma() {
-            return Some(plan.analysis.thresholds.values()[threshold]);
-        }
-        Some(self.thresholds[threshold] / sigma - mean / sigma).filter(|nu| nu.is_finite())
-    }
-
+impl MapCurves {
     /// The map, in few words.
     fn label(&self) -> String {
         let file = shown(Path::new(self.path.file_name().unwrap_or(self.path.as_os_str())));

@@ -7,8 +7,8 @@ use anyhow::bail;
 use clap::Args;
 use longan::statistics::{Statistics, statistics};
 use longan_formats::{
-    self as formats, At, AxisDescription, Description, DimensionDescription, Error, Field, FieldDescription,
-    GridDescription, Indexing, Selection, TableDescription, TablePlace,
+    self as formats, Ask, At, AxisDescription, Description, DimensionDescription, Error, ErrorKind, Field,
+    FieldDescription, GridDescription, Indexing, Selection, TableDescription, TablePlace,
 };
 use longan_grid::Healpix;
 use serde::Serialize;
@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 
 use super::input::place;
 use super::options::{Format, decimals, nside, print, shown};
+use super::remedies;
 
 /// What a file holds: its grids, dimensions and coordinate systems, and each field's unit, range and masked fraction.
 #[derive(Args, Debug)]
@@ -171,22 +172,13 @@ fn read(arguments: &Arguments, table: &TableDescription, number: usize) -> Resul
 
 /// Why a field is not read where there is nothing wrong with the file; any other error remains one.
 fn unread(error: Error) -> Result<Unread, Error> {
-    let problem = match &error {
-        Error::File { problem, .. } => problem,
-        error => error,
-    };
-    match problem {
-        Error::ColumnKind { found, .. } => Ok(Unread::NotAMap((*found).to_owned())),
-        Error::EmptyDimension { dimension, .. } => Ok(Unread::NotAMap(format!("empty along '{dimension}'"))),
-        Error::BadNumber { place, text, .. } => Ok(Unread::NotAMap(format!("'{text}' in {place}"))),
-        Error::NoValues { .. } => Ok(Unread::NotAMap("without values".to_owned())),
-        Error::DimensionLeft { .. } => Ok(Unread::Select),
-        Error::NoSuchDimension { .. }
-        | Error::NoDimension { .. }
-        | Error::NoSuchPlace { .. }
-        | Error::SeveralPlaces { .. }
-        | Error::IndexRange { .. }
-        | Error::SphereDimension { .. } => Ok(Unread::Elsewhere(problem.to_string())),
+    if let Some(found) = error.found() {
+        return Ok(Unread::NotAMap(found.to_owned()));
+    }
+    match (error.kind(), error.ask()) {
+        (ErrorKind::NoMemory | ErrorKind::InvalidInput, _) => Err(error),
+        (ErrorKind::Ambiguous, Some(Ask::Place { dimension: Some(_), place: None })) => Ok(Unread::Select),
+        (_, Some(Ask::Place { .. })) => Ok(Unread::Elsewhere(remedies::sentence(&error))),
         _ => Err(error),
     }
 }

@@ -1,17 +1,19 @@
-//! Which map of which file is analysed: the options that choose and regrid it, and its mask.
+//! The map of a file that is analysed: the options that choose and regrid it, and its mask.
 //!
-//! What files hold, and how it becomes HEALPix, is left to [`longan_formats`].
+//! The content of files, and the way to HEALPix, is left to [`longan_formats`].
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use longan::ThresholdUnit;
-use longan_formats::{self as formats, About, At, Error, Field, Maps, Place, Room, Selection};
+use longan_formats::{self as formats, About, Ask, At, Error, Field, MapSeries, MemoryEstimate, Place, Selection};
 use longan_grid::{CoordinateSystem, Gather, Healpix, Map, Method, Regrid};
 
 use super::mismatch::{Together, of_coordinates};
 use super::options::{Running, Topic, between, finite, nside, shown, whole};
+use super::remedies::of_mask;
 
 /// Which map of a file, how it comes to HEALPix, and which pixels of it.
 #[derive(Args, Clone, Debug, PartialEq)]
@@ -94,7 +96,7 @@ enum MethodOption {
 }
 
 impl Input {
-    /// What is read of each file.
+    /// The selection of each file.
     fn selection(&self) -> Selection {
         let RegridOptions { method, min_valid, gather, reach, centre, allow_folds } = self.regrid;
         let method = method.map(|method| match method {
@@ -112,13 +114,13 @@ impl Input {
     }
 
     /// The mask, if there is one, once it is clear that it can be read.
-    pub(crate) fn mask(&self, running: &Running) -> Result<Option<Mask>, Error> {
+    pub(crate) fn mask(&self, running: &Running) -> anyhow::Result<Option<Mask>> {
         // The cells of a mask are what they are, however fine the pixels.
         let regrid = Regrid { method: Some(Method::Conservative), gather: Some(Gather::Mean), ..Regrid::default() };
         let selection =
             Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), regrid, ..Selection::default() };
         let mask = |path: &PathBuf| {
-            let system = formats::open(path, &selection)?.about().coordinates;
+            let system = formats::open(path, &selection).map_err(of_mask)?.about().coordinates;
             Ok(Mask {
                 path: path.clone(),
                 selection,
@@ -167,43 +169,35 @@ impl Input {
 /// The maps of a file, one or one for each step in time.
 pub(crate) struct Series {
     path: PathBuf,
-    maps: Box<dyn Maps>,
+    maps: Box<dyn MapSeries>,
 }
 
 impl Series {
-    /// How many they are.
+    /// The number of maps.
     pub(crate) fn steps(&self) -> usize {
         self.maps.times().len().max(1)
     }
 
-    /// What they are.
+    /// Name, unit and sphere of the maps.
     pub(crate) fn about(&self) -> About {
         self.maps.about()
     }
 
-    /// What they take, where that shows before one is read.
-    pub(crate) fn room(&self) -> Option<Room> {
-        self.maps.room()
+    /// The memory that one map takes, where that is known before one is read.
+    pub(crate) fn memory(&self) -> Option<MemoryEstimate> {
+        self.maps.memory()
     }
 
-    /// One of them, masked.
-    pub(crate) fn read(&mut self, step: usize, mask: Option<&Mask>) -> Result<Map, Error> {
+    /// Reads the map of a step and masks it.
+    pub(crate) fn read(&mut self, step: usize, mask: Option<&Mask>) -> anyhow::Result<Map> {
         if let Some(mask) = mask {
-            mask.check(&self.maps.about()).map_err(|problem| of(&self.path, problem))?;
+            mask.check(&self.path, &self.maps.about())?;
         }
-        let mut map = self.maps.read(step).map_err(|problem| of(&self.path, problem))?;
+        let mut map = self.maps.read(step).map_err(|e| e.with_path(&self.path))?;
         if let Some(mask) = mask {
-            mask.apply(&mut map).map_err(|problem| of(&self.path, problem))?;
+            mask.apply(&self.path, &mut map)?;
         }
         Ok(map)
-    }
-}
-
-/// A problem with a file, unless it is said already with which.
-pub(crate) fn of(path: &Path, problem: Error) -> Error {
-    match problem {
-        Error::File { .. } => problem,
-        _ => Error::File { path: path.to_owned(), problem: Box::new(problem) },
     }
 }
 
@@ -212,30 +206,31 @@ pub(crate) struct Mask {
     path: PathBuf,
     selection: Selection,
     threshold: f64,
-    /// The coordinate system that it names, if that matters.
+    /// The coordinate system that the mask names, if that matters.
     system: Option<CoordinateSystem>,
     running: Running,
-    /// It, on the grid of the last map.
+    /// The mask on the grid of the last map.
     map: Mutex<Option<Arc<Map>>>,
 }
 
 impl Mask {
-    /// Refuses a map in other coordinates.
-    pub(crate) fn check(&self, about: &About) -> Result<(), Error> {
+    /// Refuses a map of a file in other coordinates.
+    pub(crate) fn check(&self, path: &Path, about: &About) -> anyhow::Result<()> {
         let mask = format!("the mask {}", shown(&self.path));
         match of_coordinates(("the map", about.coordinates), (&mask, self.system)) {
-            Some(reason) => Err(Error::NoResult { reason }),
+            Some(mismatch) => bail!("{}: {mismatch}", shown(path)),
             None => Ok(()),
         }
     }
 
-    /// Masks a map.
-    fn apply(&self, map: &mut Map) -> Result<(), Error> {
-        let mask = self.on(map.grid())?;
-        Ok(map.apply_mask(&mask, self.threshold)?)
+    /// Masks a map of a file.
+    fn apply(&self, path: &Path, map: &mut Map) -> anyhow::Result<()> {
+        let mask = self.on(map.grid()).map_err(|e| of_mask(e.with_path(path)))?;
+        map.apply_mask(&mask, self.threshold).with_context(|| shown(path))
     }
 
-    /// It on a grid, read unless that of the last map was the same. Other threads wait for it rather than read it too.
+    /// The mask on a grid, read unless that of the last map was the same. Other threads wait for the mask rather than
+    /// read it too.
     fn on(&self, grid: Healpix) -> Result<Arc<Map>, Error> {
         let mut last = self.map.lock().unwrap_or_else(PoisonError::into_inner);
         let mask = match last.take().filter(|mask| mask.grid() == grid) {
@@ -246,7 +241,7 @@ impl Mask {
         Ok(mask)
     }
 
-    /// It on a grid, read anew; says so where it is not the mask's own.
+    /// The mask on a grid, read anew, with a warning where it is not the mask's own.
     fn brought_to(&self, grid: Healpix) -> Result<Map, Error> {
         let mask = self.read(grid.nside())?;
         let (own, nside) = (mask.grid().nside(), grid.nside());
@@ -268,15 +263,11 @@ impl Mask {
     fn read(&self, nside: usize) -> Result<Map, Error> {
         let selection = Selection { nside: Some(nside), ..self.selection.clone() };
         match formats::read(&self.path, &selection) {
-            Err(Error::File { problem, .. }) if keeps_its_nside(&problem) => formats::read(&self.path, &self.selection),
+            // It has an Nside that it is not brought away from.
+            Err(error) if error.ask() == Some(&Ask::Nside) => formats::read(&self.path, &self.selection),
             read => read,
         }
     }
-}
-
-/// Whether a map was not read since it has an Nside that it is not brought away from.
-fn keeps_its_nside(problem: &Error) -> bool {
-    matches!(problem, Error::NotMultiOrder { .. } | Error::OneResolution { .. } | Error::Resolution { .. })
 }
 
 /// A field.

@@ -7,20 +7,21 @@
 
 mod compare;
 mod demo;
-mod drawn;
 mod graph;
 mod info;
 mod input;
-mod jobs;
 mod map;
 mod mapping;
 mod measures;
 mod mismatch;
 mod options;
 mod output;
+mod parallel;
+mod picture_format;
 mod plot;
 mod plugin;
 mod progress;
+mod quantity;
 mod regrid;
 mod regridding;
 mod remedies;

@@ -10,12 +10,12 @@ use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Parser};
-use longan_formats::{self as formats, CardValue, Error, TableDescription};
+use longan_formats::{self as formats, CardValue, Error, ErrorKind, TableDescription};
 
-use super::jobs::Jobs;
 use super::mapping::{Made, Mapper, Mapping};
 use super::options::{Running, check_apart, is_same_file, shown};
 use super::output::command;
+use super::parallel::Jobs;
 use super::progress::{Progress, rate};
 use super::regridding;
 use super::remedies::told;
@@ -253,10 +253,7 @@ impl Arguments {
 
 /// Whether the reason for an error is that the output exists.
 fn is_exists(error: &Error) -> bool {
-    match error {
-        Error::File { problem, .. } => is_exists(problem),
-        error => matches!(error, Error::Exists),
-    }
+    error.kind() == ErrorKind::Exists
 }
 
 /// The command that made an output of `longan map`, as its header says.

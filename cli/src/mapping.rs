@@ -1,8 +1,9 @@
-//! What defines a computation of Minkowski maps, and the way of one file to its Minkowski maps.
+//! The options of a computation of Minkowski maps, and the way of one file to its Minkowski maps.
 //!
-//! Which files there are, and what becomes of a failure, is left to the commands.
+//! The list of files, and the treatment of failures, is left to the commands.
 
 use std::fmt;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,18 +11,18 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 use longan::measures::{self, Catalogue, CatalogueError, Measure, split};
-use longan::statistics::{Statistics, statistics};
-use longan::window::{Summation, Ways};
-use longan::{Analysis, AnalysisError, MinkowskiMaps, ThresholdUnit};
-use longan_formats::{Error, Room};
+use longan::statistics::Statistics;
+use longan::window::{Summation, SummationCounts};
+use longan::{Analysis, AnalysisError, Block, MinkowskiMaps, ThresholdUnit};
+use longan_formats::MemoryEstimate;
 use longan_grid::{Healpix, Map};
 
-use super::input::{self, Input, Mask};
-use super::jobs::Memory;
+use super::input::{Input, Mask};
 use super::options::{
     BodyOptions, ContourOption, Running, WeightOption, between, check_memory, decimals, is_same_file, nside, shown,
 };
 use super::output::Provenance;
+use super::parallel::Memory;
 use super::plugin::Plugins;
 use super::regridding;
 use super::sink::{self, Kind, LayoutOptions};
@@ -173,6 +174,7 @@ impl Mapping {
             nside_out: self.nside_out,
             max_masked: self.max_masked,
             min_contour: self.contour.min_contour,
+            by_threshold: self.sequence,
             summation: if self.exact { Summation::Exact } else { Summation::Tolerance(self.tolerance) },
             ..self.body.analysis()
         }
@@ -183,6 +185,7 @@ impl Mapping {
 pub(crate) fn find(catalogue: &Catalogue, text: &str, command: &str) -> anyhow::Result<Arc<dyn Measure>> {
     catalogue.find(text).map_err(|e| match &e {
         CatalogueError::Formula(formula) => no_measure(text, format!("{e}\n\n{}", formula.marked()), command),
+        CatalogueError::Unknown(_) => no_measure(text, format!("{e}; `longan measures` lists them all"), command),
         _ => no_measure(text, e.to_string(), command),
     })
 }
@@ -228,7 +231,8 @@ impl Mapper<'_> {
     ) -> anyhow::Result<Made> {
         let Mapper { mapping, measures, mask, analysis, memory, running, several } = self;
         let mut series = mapping.input.open(path)?;
-        let _taken = memory.take(series.room().and_then(|room| self.bytes(room))).with_context(|| shown(path))?;
+        let _taken =
+            memory.take(series.memory().and_then(|estimate| self.bytes(estimate))).with_context(|| shown(path))?;
         let start = Instant::now();
         let steps = series.steps();
         let map = series.read(0, mask.as_ref())?;
@@ -244,34 +248,34 @@ impl Mapper<'_> {
         let mut summary = Summary::new(measures[0].as_ref());
         let mut ways = Vec::new();
         let mut empty = Vec::new();
-        sink::write(output, kind, layout, overwrite, |step| {
+        let made = |step| {
             let map = match first.take() {
                 Some(map) => map,
                 None => series.read(step, mask.as_ref())?,
             };
             mismatch::warn(running, path, &map, analysis, *several || steps > 1);
-            let told = |share| progress((step as f64 + share) / steps as f64);
-            let maps = match mapping.sequence {
-                true => analysis.sequence(&map, measures, told),
-                false => analysis.minkowski_maps(&map, measures, told),
+            let told = |share| {
+                progress((step as f64 + share) / steps as f64);
+                ControlFlow::Continue(())
             };
-            let maps = match maps {
+            let maps = match analysis.minkowski_maps(&map, measures, told) {
                 Err(AnalysisError::AllMasked | AnalysisError::Constant { .. }) if steps > 1 => {
                     empty.push(map.time.as_ref().map(|time| time.label.clone()).unwrap_or_default());
-                    undefined(analysis, &map, grid, tables, measures.len())
+                    analysis.undefined(&map, measures).with_context(about)?
                 }
-                maps => maps.map_err(|e| {
-                    let when = map.time.as_ref().filter(|_| steps > 1).map(|time| format!("at {}: ", time.label));
-                    input::of(path, Error::NoResult { reason: format!("{}{e}", when.unwrap_or_default()) })
-                })?,
+                maps => {
+                    let when = map.time.as_ref().filter(|_| steps > 1).map(|time| format!(": at {}", time.label));
+                    maps.with_context(|| format!("{}{}", shown(path), when.unwrap_or_default()))?
+                }
             };
             if step == 0 {
-                ways = maps.iter().map(explained).collect();
+                ways = maps.blocks.iter().map(explained).collect();
             }
-            maps.iter().for_each(|maps| summary.add(maps, &map, analysis));
+            summary.add(&maps, &map, analysis);
             let input = Some(&mapping.input);
-            Ok(Provenance { path, map: &map, input, analysis, command: command.to_owned() }.step(maps, measures))
-        })?;
+            Ok(Provenance { path, map: &map, input, analysis, command: command.to_owned() }.step(&maps, measures))
+        };
+        sink::write(output, kind, layout, overwrite, (0..steps).map(made))?;
         warnings.extend(empty.first().map(|one| {
             let (about, n) = (about(), empty.len());
             let others = if n > 1 { format!(" and {} other steps", n - 1) } else { String::new() };
@@ -284,12 +288,12 @@ impl Mapper<'_> {
     }
 
     /// About how many bytes it takes to map a file, where that shows before it is read.
-    fn bytes(&self, room: Room) -> Option<usize> {
-        let grid = Healpix::new(room.nside).ok()?;
+    fn bytes(&self, estimate: MemoryEstimate) -> Option<usize> {
+        let grid = Healpix::new(estimate.nside).ok()?;
         let mask = if self.mask.is_some() { grid.pixels().saturating_mul(size_of::<f64>()) } else { 0 };
         // Where there is an error, mapping says so.
-        let maps = self.analysis.memory(grid, &self.measures, self.mapping.sequence).ok()?;
-        Some(room.bytes.saturating_add(mask).saturating_add(maps))
+        let maps = self.analysis.memory(grid, &self.measures).ok()?;
+        Some(estimate.bytes.saturating_add(mask).saturating_add(maps))
     }
 
     /// The number of Minkowski maps of each measure that a step makes.
@@ -297,22 +301,6 @@ impl Mapper<'_> {
         let thresholds = if self.mapping.sequence { self.analysis.thresholds.values().len() } else { 1 };
         self.analysis.windows.len() * thresholds
     }
-}
-
-/// The result for a map that has no shape to measure: nothing but masked pixels.
-fn undefined(analysis: &Analysis, map: &Map, grid: Healpix, tables: usize, measures: usize) -> Vec<MinkowskiMaps> {
-    let nothing = Statistics { unmasked: 0, min: f64::NAN, max: f64::NAN, mean: f64::NAN, sigma: f64::NAN };
-    let each = tables / analysis.windows.len();
-    let of = |window: &f64| MinkowskiMaps {
-        grid,
-        window: *window,
-        thresholds: analysis.thresholds.clone(),
-        of_map: statistics(map.values()).unwrap_or(nothing),
-        values: vec![vec![f64::NAN; grid.pixels()]; measures],
-        masked: grid.pixels(),
-        ways: Ways::default(),
-    };
-    analysis.windows.iter().flat_map(|window| std::iter::repeat_n(of(window), each)).collect()
 }
 
 /// What Minkowski maps hold, in a few words: of what thresholds, which values, and which windows have none.
@@ -343,7 +331,7 @@ fn widened(range: Option<[f64; 2]>, x: f64) -> Option<[f64; 2]> {
 impl Summary {
     fn new(measure: &dyn Measure) -> Self {
         Summary {
-            is_angle: measure.unit() == "deg",
+            is_angle: !measure.quantity().has_mean(),
             range: None,
             medians: None,
             thresholds: [None; 2],
@@ -358,29 +346,31 @@ impl Summary {
 
     /// Takes the first measure of Minkowski maps of a map into account.
     fn add(&mut self, maps: &MinkowskiMaps, map: &Map, analysis: &Analysis) {
-        let mut values: Vec<f64> = maps.values[0].iter().copied().filter(|value| !value.is_nan()).collect();
-        self.windows += maps.grid.pixels();
-        self.masked += maps.masked;
-        self.empty += maps.grid.pixels() - maps.masked - values.len();
         self.min_contour = analysis.min_contour;
         self.of = analysis.thresholds.values().len();
         self.unit = map.unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default();
         let Statistics { mean, sigma, .. } = maps.of_map;
         // A map that is masked everywhere has thresholds in its own unit only where they were given so.
         let known = analysis.threshold_unit == ThresholdUnit::Value || sigma > 0.0;
-        for &threshold in maps.thresholds.values().iter().filter(|_| known) {
-            self.thresholds[1] = widened(self.thresholds[1], threshold);
-            if sigma > 0.0 {
-                self.thresholds[0] = widened(self.thresholds[0], (threshold - mean) / sigma);
+        for block in &maps.blocks {
+            let mut values: Vec<f64> = block.values.row(0).iter().copied().filter(|value| !value.is_nan()).collect();
+            self.windows += maps.grid.pixels();
+            self.masked += block.masked;
+            self.empty += maps.grid.pixels() - block.masked - values.len();
+            for &threshold in block.thresholds.values().iter().filter(|_| known) {
+                self.thresholds[1] = widened(self.thresholds[1], threshold);
+                if sigma > 0.0 {
+                    self.thresholds[0] = widened(self.thresholds[0], (threshold - mean) / sigma);
+                }
             }
+            if values.is_empty() {
+                continue;
+            }
+            values.sort_by(f64::total_cmp);
+            let n = values.len();
+            self.range = widened(widened(self.range, values[0]), values[n - 1]);
+            self.medians = widened(self.medians, 0.5 * (values[(n - 1) / 2] + values[n / 2]));
         }
-        if values.is_empty() {
-            return;
-        }
-        values.sort_by(f64::total_cmp);
-        let n = values.len();
-        self.range = widened(widened(self.range, values[0]), values[n - 1]);
-        self.medians = widened(self.medians, 0.5 * (values[(n - 1) / 2] + values[n / 2]));
     }
 
     /// The thresholds in both units.
@@ -442,8 +432,8 @@ fn short(x: f64) -> String {
 }
 
 /// How the windows of a map were summed, and why.
-fn explained(maps: &MinkowskiMaps) -> String {
-    let Ways { direct, missed, prefix, error, terms } = maps.ways;
+fn explained(block: &Block) -> String {
+    let SummationCounts { direct, missed, prefix, error, terms } = block.counts;
     let mut ways = Vec::new();
     let all = (direct + missed + prefix).max(1) as f64;
     let mut way = |pairs: usize, how: String| {
@@ -458,5 +448,5 @@ fn explained(maps: &MinkowskiMaps) -> String {
     way(direct, "pixel by pixel, which costs less there or was asked for".to_owned());
     way(missed, "pixel by pixel, since no fit met the tolerance".to_owned());
     let pairs = "of all pairs of an output pixel and an input ring";
-    format!("window of {} degrees, {pairs}: {}", maps.window, ways.join("; "))
+    format!("window of {} degrees, {pairs}: {}", block.window, ways.join("; "))
 }

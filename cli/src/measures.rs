@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::options::{Format, print};
 use super::plugin::Plugins;
 
-/// Every measure, with its definition, unit and rank; N stands for any rank from 1.
+/// Every measure, with its definition, quantity, unit and rank; N stands for any rank from 1.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Formulas: `longan map --measure \"NAME = EXPRESSION\"` makes a measure of others; NAME, in capitals, names the column. \
@@ -27,7 +27,12 @@ formula. The header of the output keeps it as FORMULA1, FORMULA2 and so on, whic
 Plugins: libraries with measures of one's own, in C or Rust, named by --plugin or lying in a folder of the environment \
 variable LONGAN_PLUGIN_PATH. A measure whose name others have too is named with its plugin, as in example:evq, and a \
 built-in as longan:evq. A plugin is code that runs with your rights, from the moment that it is loaded, also for this \
-list: load only what you trust. `longan plugin new NAME` starts one.")]
+list: load only what you trust. One that was built for another version of the interface is refused: build it anew. \
+`longan plugin new NAME` starts one.
+
+Quantities: each measure states its own, a formula that it is a number. Headers keep it, as TQTY1, TQTY2 and so on, and of \
+an angle its symmetry, as TSYM1; in NetCDF a variable has the attributes quantity and symmetry. Colours, means, rods and \
+comparisons follow from it.")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     plugins: Plugins,
@@ -40,6 +45,10 @@ pub(crate) struct Arguments {
 struct Line {
     name: String,
     rank: String,
+    quantity: &'static str,
+    /// Of an angle the number of turns within 360 degrees that change nothing, N in a family.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    symmetry: Option<String>,
     unit: String,
     definition: String,
     from: String,
@@ -50,6 +59,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let built_ins = BUILT_INS.iter().map(|kind| Line {
         name: kind.pattern.to_owned(),
         rank: kind.rank.map_or("N".to_owned(), |rank| rank.to_string()),
+        quantity: (kind.quantity)(1).name(),
+        symmetry: (kind.quantity)(1).symmetry().map(|symmetry| match kind.rank {
+            Some(_) => symmetry.to_string(),
+            None => "N".to_owned(),
+        }),
         unit: kind.unit.to_owned(),
         definition: kind.definition.to_owned(),
         from: "longan".to_owned(),
@@ -58,6 +72,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         plugin.measures().iter().map(|measure| Line {
             name: catalogue.name_of(plugin, measure),
             rank: measure.rank().to_string(),
+            quantity: measure.quantity().name(),
+            symmetry: measure.quantity().symmetry().map(|symmetry| symmetry.to_string()),
             unit: measure.unit().to_owned(),
             definition: measure.definition(),
             from: match measure.origin() {
@@ -72,13 +88,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Format::Json => writeln!(out, "{}", serde_json::to_string_pretty(&lines)?)?,
         Format::Text => {
             let width = lines.iter().map(|line| line.name.len()).max().unwrap_or(0);
-            writeln!(out, "{:<width$} {:>4} {:>5}  definition", "name", "rank", "unit")?;
+            writeln!(out, "{:<width$} {:>4} {:<10} {:>4}  definition", "name", "rank", "quantity", "unit")?;
             for (i, line) in lines.iter().enumerate() {
                 if i > 0 && lines[i - 1].from != line.from {
                     writeln!(out, "\n{}:", line.from)?;
                 }
                 let unit = if line.unit.is_empty() { "-" } else { &line.unit };
-                writeln!(out, "{:<width$} {:>4} {unit:>5}  {}", line.name, line.rank, line.definition)?;
+                let quantity = match &line.symmetry {
+                    Some(symmetry) => format!("{}/{symmetry}", line.quantity),
+                    None => line.quantity.to_owned(),
+                };
+                let Line { name, rank, definition, .. } = line;
+                writeln!(out, "{name:<width$} {rank:>4} {quantity:<10} {unit:>4}  {definition}")?;
             }
             writeln!(
                 out,
@@ -88,8 +109,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                  The body is where the field is at or above a threshold (the paper's text takes what is below: --body below).\n\
                  A cell with a masked corner counts nothing, so a lone masked pixel masks four cells. Areas, lengths and ψ_s\n\
                  are divided by the unmasked share of the window's cells, curvatures by that of its edges; contour-length\n\
-                 is not. For a window with hardly any contour, ratios and directions are left to chance: --min-contour. EVQ has\n\
-                 no bound, so take means of beta or q2 instead.\n\
+                 is not. For a window with hardly any contour, ratios and angles are left to chance: --min-contour. EVQ has no\n\
+                 bound, so take means of beta or q2 instead. angle/s is a direction of which 360/s degrees are a whole turn, a\n\
+                 moment a length, or with --weight curvature a curvature. Files state the quantity of each column.\n\
                  `longan measures --help` says how to write formulas of these, and how to add measures by plugins."
             )?;
         }

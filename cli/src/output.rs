@@ -4,11 +4,13 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use longan::measures::{Measure, Origin};
-use longan::{Analysis, Body, MinkowskiMaps, ThresholdUnit, Weight};
+use longan::statistics::Statistics;
+use longan::{Analysis, Block, Body, MinkowskiMaps, ThresholdUnit, Weight};
 use longan_formats::{Card, CardValue, NetcdfColumn};
 use longan_grid::Map;
 
 use super::input::Input;
+use super::quantity::stated;
 use super::regridding;
 use super::sink::{MapColumn, Step, Table};
 
@@ -76,9 +78,9 @@ pub(crate) fn numbered(keyword: &str, number: usize) -> String {
 
 impl Provenance<'_> {
     /// What is written of the Minkowski maps of one step.
-    pub(crate) fn step(&self, maps: Vec<MinkowskiMaps>, measures: &[impl AsRef<dyn Measure>]) -> Step {
+    pub(crate) fn step(&self, maps: &MinkowskiMaps, measures: &[impl AsRef<dyn Measure>]) -> Step {
         let windows = self.analysis.windows.len();
-        let thresholds = maps.len() / windows;
+        let thresholds = maps.blocks.len() / windows;
         let name = |i: usize, window: f64| match (windows, thresholds) {
             (1, 1) => "MINKOWSKI MAP".to_owned(),
             (1, _) => format!("THRESHOLD {}", i + 1),
@@ -86,14 +88,14 @@ impl Provenance<'_> {
             (_, _) => format!("WINDOW {window} THRESHOLD {}", i % thresholds + 1),
         };
         let origins = origins(measures);
-        let attributes = [self.attributes(&maps, thresholds > 1), origins.clone()].concat();
-        let numbers = self.numbers(&maps[0]);
-        let tables = maps.into_iter().enumerate().map(|(i, maps)| {
-            let of = self.words(&maps, (thresholds > 1).then_some(i % thresholds));
+        let attributes = [self.attributes(maps, thresholds > 1), origins.clone()].concat();
+        let numbers = self.numbers(maps.of_map);
+        let tables = maps.blocks.iter().enumerate().map(|(i, block)| {
+            let of = self.words(block, (thresholds > 1).then_some(i % thresholds));
             Table {
-                name: name(i, maps.window),
-                cards: [self.cards(&maps), origins.clone()].concat(),
-                columns: std::iter::zip(measures.iter().map(AsRef::as_ref), maps.values)
+                name: name(i, block.window),
+                cards: [self.cards(maps.of_map, block), origins.clone()].concat(),
+                columns: std::iter::zip(measures.iter().map(AsRef::as_ref), block.values.rows())
                     .map(|(measure, values)| MapColumn {
                         name: measure.column(),
                         unit: measure.unit().to_owned(),
@@ -101,7 +103,8 @@ impl Provenance<'_> {
                             Origin::Formula(formula) => formula,
                             Origin::Program | Origin::Plugin(_) => format!("{} {of}", measure.definition()),
                         },
-                        values,
+                        quantity: Some(stated(measure.quantity().weighted(self.analysis.weight))),
+                        values: values.to_vec(),
                     })
                     .collect(),
             }
@@ -110,8 +113,8 @@ impl Provenance<'_> {
     }
 
     /// Of what a map is, in words: the window, and the threshold if it is of one.
-    fn words(&self, maps: &MinkowskiMaps, threshold: Option<usize>) -> String {
-        let window = match maps.window {
+    fn words(&self, block: &Block, threshold: Option<usize>) -> String {
+        let window = match block.window {
             0.0 => "of each pixel".to_owned(),
             window => format!("in windows of {window} degrees"),
         };
@@ -138,10 +141,10 @@ impl Provenance<'_> {
     }
 
     /// What is said of a file as a whole: the entries of the first table, but for what differs between tables or steps.
-    fn attributes(&self, maps: &[MinkowskiMaps], sequence: bool) -> Vec<Card> {
+    fn attributes(&self, maps: &MinkowskiMaps, sequence: bool) -> Vec<Card> {
         let windows: Vec<_> = self.analysis.windows.iter().map(f64::to_string).collect();
         let mut cards = vec![text("TITLE", format!("Minkowski map of {}", self.map.name), "")];
-        for card in self.cards(&maps[0]) {
+        for card in self.cards(maps.of_map, &maps.blocks[0]) {
             let of_input = ["INMEAN", "INSIGMA"].contains(&&*card.key);
             let of_thresholds =
                 card.key == "NTHRESH" || card.key.strip_prefix("THR").is_some_and(|n| n.parse::<u32>().is_ok());
@@ -149,7 +152,9 @@ impl Provenance<'_> {
                 _ if of_input && self.map.time.is_some() => continue,
                 _ if of_thresholds && (sequence || self.of_the_step()) => continue,
                 "WINDOW" if windows.len() > 1 => text("WINDOW", windows.join(", "), ""),
-                "PSIERROR" => real("PSIERROR", maps.iter().map(|m| m.ways.error).fold(0.0, f64::max), ""),
+                "PSIERROR" => {
+                    real("PSIERROR", maps.blocks.iter().map(|block| block.counts.error).fold(0.0, f64::max), "")
+                }
                 "COMMAND" => text("HISTORY", self.command.clone(), ""),
                 _ => card,
             });
@@ -159,31 +164,29 @@ impl Provenance<'_> {
     }
 
     /// The numbers that each step has by itself.
-    fn numbers(&self, maps: &MinkowskiMaps) -> Vec<(NetcdfColumn, f64)> {
+    fn numbers(&self, of_map: Statistics) -> Vec<(NetcdfColumn, f64)> {
         if self.map.time.is_none() {
             return Vec::new();
         }
         let number = |name: &str, what: &str, value: f64| {
             let (name, long_name) = (name.to_owned(), format!("{what} of the unmasked pixels of {}", self.map.name));
-            (NetcdfColumn { name, unit: self.map.unit.clone().unwrap_or_default(), long_name }, value)
+            let unit = self.map.unit.clone().unwrap_or_default();
+            (NetcdfColumn { name, unit, long_name, quantity: None }, value)
         };
-        vec![
-            number("input_mean", "mean", maps.of_map.mean),
-            number("input_sigma", "standard deviation", maps.of_map.sigma),
-        ]
+        vec![number("input_mean", "mean", of_map.mean), number("input_sigma", "standard deviation", of_map.sigma)]
     }
 
-    fn cards(&self, maps: &MinkowskiMaps) -> Vec<Card> {
-        let (map, analysis, thresholds) = (self.map, self.analysis, maps.thresholds.values());
+    fn cards(&self, of_map: Statistics, block: &Block) -> Vec<Card> {
+        let (map, analysis, thresholds) = (self.map, self.analysis, block.thresholds.values());
         let mut cards = input_cards(self.path, map);
         if let Some(input) = self.input {
             cards.extend(mask_cards(input));
         }
         cards.extend([
-            real("INMEAN", maps.of_map.mean, "mean of the unmasked pixels"),
-            real("INSIGMA", maps.of_map.sigma, "their standard deviation"),
-            real("WINDOW", maps.window, "[deg] radius of the window, 0: the pixel itself"),
-            real("PSIERROR", maps.ways.error, "error of psi_s over sum of |weights|, 0: direct sum"),
+            real("INMEAN", of_map.mean, "mean of the unmasked pixels"),
+            real("INSIGMA", of_map.sigma, "their standard deviation"),
+            real("WINDOW", block.window, "[deg] radius of the window, 0: the pixel itself"),
+            real("PSIERROR", block.counts.error, "error of psi_s over sum of |weights|, 0: direct sum"),
             real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
             real("MINCONT", analysis.min_contour, "[window radii] least contour for ratios"),
             text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
@@ -200,7 +203,7 @@ impl Provenance<'_> {
             integer("NTHRESH", thresholds.len(), "number of thresholds averaged over"),
         ]);
         // Without scatter there are no multiples of it.
-        let known = analysis.threshold_unit == ThresholdUnit::Value || maps.of_map.sigma > 0.0;
+        let known = analysis.threshold_unit == ThresholdUnit::Value || of_map.sigma > 0.0;
         for (i, threshold) in thresholds.iter().enumerate().filter(|_| known) {
             cards.push(real(&format!("THR{}", i + 1), *threshold, "threshold, in the unit of the field"));
         }

@@ -9,20 +9,23 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
+use longan::measures::Quantity;
 use longan::{Body, Thresholds, contour_lines};
 use longan_formats::{self as formats, At, Field, Selection};
 use longan_grid::{Map, Sphere};
 use longan_picture::projection::{self, Equirectangular, Gnomonic, Hammer, Mollweide, Orthographic, Projection};
 use longan_picture::{
-    Circle, Colouring, Colours, Mark, Meaning, Options, Orientation, Overlays, Rods, View, WIDTHS, draw, superscript,
+    Circle, Colouring, Colours, Mark, Options, Orientation, Overlays, Rods, View, WIDTHS, draw, superscript,
 };
 
-use super::drawn::{Form, save};
 use super::input::{Input, Mask, field, place};
 use super::mismatch::of_coordinates;
 use super::misused;
 use super::options::{Running, check_apart, finite, shown};
+use super::picture_format::{Form, save};
+use super::quantity::{meaning, of_column};
 use super::regridding;
+use super::remedies::of_contours;
 
 /// A picture of a map: PNG, or SVG whose lines and letters stay sharp at any size.
 ///
@@ -155,7 +158,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     check_apart(output, inputs.map(PathBuf::as_path))?;
     formats::check_writable(output, arguments.overwrite)?;
     let mask = arguments.input.mask(running)?;
-    let map = arguments.read(&arguments.input, path, mask.as_ref())?;
+    let (map, quantity) = arguments.read(&arguments.input, path, mask.as_ref())?;
     if let Some(warning) = regridding::warning(path, &map) {
         running.warn(warning);
     }
@@ -183,7 +186,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             range: arguments.range.unwrap_or_default(),
             log: arguments.log,
             colours: arguments.colours.as_deref().map(str::parse).transpose()?,
-            meaning: Meaning::of(&map.name),
+            meaning: meaning(quantity),
         },
         view: View::new(projection, arguments.middle, orientation)?,
         graticule: !arguments.no_graticule,
@@ -223,11 +226,12 @@ impl Arguments {
         })
     }
 
-    /// The map of a file; the first of several times, and says so.
-    fn read(&self, input: &Input, path: &Path, mask: Option<&Mask>) -> anyhow::Result<Map> {
+    /// The map of a file and its quantity; of several times the first, and a warning says so.
+    fn read(&self, input: &Input, path: &Path, mask: Option<&Mask>) -> anyhow::Result<(Map, Quantity)> {
         let mut series = input.open(path)?;
         let steps = series.steps();
         let map = series.read(0, mask)?;
+        let quantity = of_column(series.about().quantity.as_ref(), &map.name);
         if let (true, Some(time)) = (steps > 1, &map.time) {
             let first = &time.label;
             self.running.warn(format_args!(
@@ -235,7 +239,7 @@ impl Arguments {
                 shown(path)
             ));
         }
-        Ok(map)
+        Ok((map, quantity))
     }
 
     /// The contours asked for.
@@ -245,7 +249,7 @@ impl Arguments {
         let Some(path) = &self.contour else { return Ok(of(map)) };
         let selection =
             Selection { field: self.contour_variable.clone(), at: self.contour_select.clone(), ..Selection::default() };
-        let other = formats::read(path, &selection)?;
+        let other = formats::read(path, &selection).map_err(of_contours)?;
         let system = map.coordinates.filter(|_| !self.input.ignore_coordsys);
         let of_contours = format!("the map of contours {}", shown(path));
         if let Some(mismatch) = of_coordinates(("the map", system), (&of_contours, other.coordinates)) {
@@ -261,8 +265,9 @@ impl Arguments {
         }
         let mut input = self.input.clone();
         input.field.clone_from(&self.rods);
-        let map = input.open(path)?.read(0, mask)?;
-        let Meaning::Direction { symmetry } = Meaning::of(&map.name) else {
+        let mut series = input.open(path)?;
+        let map = series.read(0, mask)?;
+        let Quantity::Angle { symmetry } = of_column(series.about().quantity.as_ref(), &map.name) else {
             bail!(
                 "{}: '{}' is not a column of directions; choose one such as EVQ_DIRECTION or PSI4_DIRECTION for --rods",
                 shown(path),

@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let layout = layout.layout(map, grid, kind, steps).with_context(|| shown(path))?;
     let progress = Progress::new(shown(path), running.quiet);
     let mut summary = Summary::default();
-    sink::write(output, kind, layout, *overwrite, |step| {
+    let made = |step| {
         let map = match first.take() {
             Some(map) => map,
             None => series.read(step, mask.as_ref())?,
@@ -69,7 +69,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         progress.set((step + 1) as f64 / steps as f64);
         summary.add(map.values());
         Ok(of(path, map, input))
-    })?;
+    };
+    sink::write(output, kind, layout, *overwrite, (0..steps).map(made))?;
     drop(progress);
     if let Some(warning) = warning {
         running.warn(warning);
@@ -94,6 +95,7 @@ fn of(path: &Path, map: Map, input: &Input) -> Step {
         name: map.name.clone(),
         unit: map.unit.clone().unwrap_or_default(),
         long_name: map.long_name.clone().unwrap_or_default(),
+        quantity: None,
         values: map.into_values(),
     };
     let table = Table { name: "MAP".to_owned(), cards, columns: vec![column] };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use longan::simulate::{Body, Edge, Shape, Waves, scene, shapes};
-use longan_formats::{self as formats, Card, Error};
+use longan_formats::{self as formats, Card};
 use longan_grid::{Healpix, Map, Ordering};
 
 use super::options::{Running, acute, between, check_memory, finite, nside, shown, whole};
@@ -152,13 +152,14 @@ pub(crate) fn waves_cards(waves: &Waves, correlation: f64, seed: u64) -> Vec<Car
     ]
 }
 
-/// What is written of a map.
+/// The step of a file that holds a map.
 pub(crate) fn step(map: &Map, mut cards: Vec<Card>) -> Step {
     cards.insert(0, creator());
     let column = MapColumn {
         name: map.name.to_uppercase(),
         unit: map.unit.clone().unwrap_or_default(),
         long_name: String::new(),
+        quantity: None,
         values: map.values().to_vec(),
     };
     let attributes = cards.clone();
@@ -169,10 +170,7 @@ pub(crate) fn step(map: &Map, mut cards: Vec<Card>) -> Step {
 /// Writes one step in RING order.
 pub(crate) fn write(path: &Path, grid: Healpix, overwrite: bool, step: Step) -> anyhow::Result<()> {
     let layout = Layout { grid, ordering: Ordering::Ring, coordinates: None, float32: false, steps: 1 };
-    let mut step = Some(step);
-    // There is one step, so that this is called once.
-    let make = |_| step.take().ok_or_else(|| Error::NoResult { reason: "there is but one map".to_owned() });
-    Ok(sink::write(path, Kind::of(path)?, layout, overwrite, make)?)
+    sink::write(path, Kind::of(path)?, layout, overwrite, [Ok(step)])
 }
 
 impl Output {

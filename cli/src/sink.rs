@@ -1,14 +1,14 @@
 //! Files of maps, in the format that their name asks for, written step by step.
 //!
-//! What the maps are is left to the commands, the bytes to [`longan_formats`].
+//! The content of maps is left to the commands, the bytes to [`longan_formats`].
 
 use std::path::Path;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use longan_formats::{
     self as formats, Card, CardValue, Column, Error, Extension, HealpixLayout, HealpixWriter, NetcdfColumn,
-    NetcdfLayout, NetcdfWriter, TimeAxis,
+    NetcdfLayout, NetcdfWriter, StatedQuantity, TimeAxis,
 };
 use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Time};
 
@@ -82,13 +82,13 @@ impl Kind {
     }
 }
 
-/// What is written of one step.
+/// The content of one step of a file.
 pub(crate) struct Step {
-    /// Its time, where it has one.
+    /// The time of the step, where it has one.
     pub(crate) time: Option<Time>,
     /// The maps.
     pub(crate) tables: Vec<Table>,
-    /// What is said of the file as a whole where tables have no headers of their own; of the first step only.
+    /// The attributes of the file as a whole where tables have no headers of their own; of the first step only.
     pub(crate) attributes: Vec<Card>,
     /// Numbers that each step has, where tables have no headers of their own.
     pub(crate) numbers: Vec<(NetcdfColumn, f64)>,
@@ -105,12 +105,14 @@ pub(crate) struct Table {
 pub(crate) struct MapColumn {
     pub(crate) name: String,
     pub(crate) unit: String,
-    /// What it is in words; may be empty.
+    /// A description in words; may be empty.
     pub(crate) long_name: String,
+    /// The quantity, if known.
+    pub(crate) quantity: Option<StatedQuantity>,
     pub(crate) values: Vec<f64>,
 }
 
-/// What all steps of a file have in common.
+/// The grid and format that all steps of a file share.
 #[derive(Clone, Copy)]
 pub(crate) struct Layout {
     pub(crate) grid: Healpix,
@@ -139,7 +141,7 @@ impl LayoutOptions {
     }
 }
 
-/// Writes a file, all or nothing, of steps that are made one after the other.
+/// Writes a file, all or nothing, of one step or several, which are made one after the other.
 ///
 /// # Errors
 /// Those of the steps, and those of writing.
@@ -148,29 +150,33 @@ pub(crate) fn write(
     kind: Kind,
     layout: Layout,
     overwrite: bool,
-    mut step: impl FnMut(usize) -> Result<Step, Error>,
-) -> Result<(), Error> {
-    formats::save(path, overwrite, |path| match kind {
+    steps: impl IntoIterator<Item = anyhow::Result<Step>>,
+) -> anyhow::Result<()> {
+    // The file that is asked for is named, not the temporary one.
+    let named = |error: Error| error.with_path(path);
+    formats::save(path, overwrite, |temporary| match kind {
         Kind::Fits => {
-            let Layout { grid, ordering, coordinates, float32, steps } = layout;
-            let mut writer = HealpixWriter::create(path, HealpixLayout { grid, ordering, coordinates, float32 })?;
-            for i in 0..steps {
-                let Step { time, tables, .. } = step(i)?;
+            let Layout { grid, ordering, coordinates, float32, steps: count } = layout;
+            let of_file = HealpixLayout { grid, ordering, coordinates, float32 };
+            let mut writer = HealpixWriter::create(temporary, of_file).map_err(named)?;
+            for step in steps {
+                let Step { time, tables, .. } = step?;
                 for table in tables {
-                    writer.append(&extension_of(table, time.as_ref(), steps))?;
+                    writer.append(&extension_of(table, time.as_ref(), count)).map_err(named)?;
                 }
             }
-            writer.finish()
+            Ok(writer.finish().map_err(named)?)
         }
         Kind::Netcdf => {
-            let mut first = step(0)?;
-            let mut writer = NetcdfWriter::create(path, netcdf_layout(layout, &mut first))?;
-            append(&mut writer, &first)?;
+            let mut steps = steps.into_iter();
+            let mut first = steps.next().context("there is no step to write")??;
+            let mut writer = NetcdfWriter::create(temporary, netcdf_layout(layout, &mut first)).map_err(named)?;
+            append(&mut writer, &first).map_err(named)?;
             drop(first);
-            for i in 1..layout.steps {
-                append(&mut writer, &step(i)?)?;
+            for step in steps {
+                append(&mut writer, &step?).map_err(named)?;
             }
-            writer.finish()
+            Ok(writer.finish().map_err(named)?)
         }
     })
 }
@@ -184,11 +190,13 @@ fn extension_of(table: Table, time: Option<&Time>, steps: usize) -> Extension {
         }
         cards.extend(time_cards(time));
     }
+    let quantities = (1..).zip(&columns).filter_map(|(number, column)| Some(column.quantity.as_ref()?.cards(number)));
+    cards.extend(quantities.flatten());
     let column = |MapColumn { name, unit, values, .. }: MapColumn| Column { name, unit, values };
     Extension { name, cards, history: Vec::new(), columns: columns.into_iter().map(column).collect() }
 }
 
-/// What a FITS header says of a time: as the file had it, and its date where FITS has such dates.
+/// The entries of a FITS header for a time: as the file had it, and its date where FITS has such dates.
 fn time_cards(time: &Time) -> Vec<Card> {
     let real = Card { key: "TIME".into(), value: CardValue::Real(time.value), comment: "time of the input".into() };
     let mut cards = vec![real, text("TIMEUNIT", time.units.clone(), "its unit")];
@@ -212,6 +220,7 @@ fn netcdf_layout(layout: Layout, first: &mut Step) -> NetcdfLayout {
         name: if several { format!("{}_{}", column.name, table.name) } else { column.name.clone() },
         unit: column.unit.clone(),
         long_name: column.long_name.clone(),
+        quantity: column.quantity.clone(),
     };
     let of_table = |table| -> Vec<_> { Table::columns(table).iter().map(|c| column(table, c)).collect() };
     let mut attributes = std::mem::take(&mut first.attributes);

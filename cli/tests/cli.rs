@@ -24,6 +24,8 @@ mod names_and_streams;
 mod plot;
 /// Measures from libraries, and `longan plugin`.
 mod plugins;
+/// Quantities of columns, in files and in what is made of them.
+mod quantities;
 /// What is refused, and in which words.
 mod refusals;
 /// `totals`, `info`, `measures`, `simulate` and `demo`.

@@ -51,6 +51,7 @@ static const LonganMeasure MEASURES[] = {
     {
         .size = sizeof(LonganMeasure),
         .rank = 2,
+        .quantity = LONGAN_QUANTITY_RATIO,
         .weight = LONGAN_WEIGHT_LENGTH,
         .ranks = RANKS,
         .ranks_count = 2,
@@ -62,6 +63,7 @@ static const LonganMeasure MEASURES[] = {
     {
         .size = sizeof(LonganMeasure),
         .rank = 2,
+        .quantity = LONGAN_QUANTITY_RATIO,
         .ranks = RANKS,
         .ranks_count = 2,
         .name = "quotient",

@@ -1,6 +1,6 @@
 //! The edge to cfitsio: files, HDUs, keywords and columns, safely.
 //!
-//! All `unsafe` of this crate is here. What the keywords and columns mean is left to others.
+//! All `unsafe` calls of cfitsio are here. The meaning of keywords and columns is left to others.
 //!
 //! cfitsio gives file names a syntax of its own (`map.fits[1]`, `map.fits(copy)`, `!map.fits`, `~user`). Users' paths
 //! must not be subject to it, hence the "diskfile" functions and the care of [`c_path`]. It is trusted with nothing
@@ -18,7 +18,34 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use fitsio::sys;
 use tempfile::NamedTempFile;
 
-use crate::Error;
+use crate::error::{self, Error, ErrorKind, Reason, Use};
+use crate::text::spaced;
+
+/// A refusal of cfitsio, or a value that cfitsio cannot be trusted with.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Problem {
+    #[error("cannot {action}: the FITS library says \"{message}\" (status {status}); {}", .use_of.remedy())]
+    Refused { action: String, status: c_int, message: String, use_of: Use },
+    #[error(
+        "the path has {bytes} bytes but the FITS library takes at most {limit}; use a shorter one, such as a relative path"
+    )]
+    PathTooLong { bytes: usize, limit: usize },
+    #[error("HDU {hdu} has {key} = {value}, which is not {expected}; correct the header")]
+    Keyword { hdu: usize, key: String, value: String, expected: &'static str },
+}
+
+/// The use of a file that is read.
+const READING: Use = Use::Reading("check the file with fitsverify");
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Refused { use_of, .. } => use_of.kind(),
+            Problem::PathTooLong { .. } => ErrorKind::Unsupported,
+            Problem::Keyword { .. } => ErrorKind::Invalid,
+        }
+    }
+}
 
 /// cfitsio's side of an open file.
 struct Handle(*mut sys::fitsfile);
@@ -83,28 +110,36 @@ fn guard() -> Option<MutexGuard<'static, ()>> {
     (!reentrant).then(|| ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Calls cfitsio and makes its status a `Result`.
-fn call(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
+/// The status of a call of cfitsio, 0 where all is well.
+fn status_of(function: impl FnOnce(&mut c_int)) -> c_int {
     let _guard = guard();
     let mut status = 0;
     function(&mut status);
-    match status {
+    status
+}
+
+/// A status as a `Result`.
+fn checked(status: c_int, action: impl Display, use_of: Use) -> Result<(), Error> {
+    let action = match status {
         0 => return Ok(()),
-        END_OF_FILE => return Err(Error::CutShort { action: action.to_string() }),
-        _ => {}
-    }
+        END_OF_FILE => return Err(error::Problem::CutShort { action: action.to_string() }.into()),
+        _ => action.to_string(),
+    };
     let mut text = [0 as c_char; sys::FLEN_ERRMSG as usize];
+    let _guard = guard();
     // SAFETY: the buffer has the length that cfitsio documents (FLEN_STATUS) and more.
     unsafe { sys::ffgerr(status, text.as_mut_ptr()) };
-    Err(Error::Cfitsio { action: action.to_string(), status, message: from_c(&text) })
+    Err(Problem::Refused { action, status, message: from_c(&text), use_of }.into())
+}
+
+/// Calls cfitsio to read.
+fn call(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
+    checked(status_of(function), action, READING)
 }
 
 /// Calls cfitsio to write.
 fn write(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), Error> {
-    call(action, function).map_err(|e| match e {
-        Error::Cfitsio { action, status, message } => Error::CfitsioWrite { action, status, message },
-        e => e,
-    })
+    checked(status_of(function), action, Use::Writing)
 }
 
 /// The text in a buffer up to its NUL, without FITS's padding and control characters. Headers should be ASCII, but
@@ -112,7 +147,7 @@ fn write(action: impl Display, function: impl FnOnce(&mut c_int)) -> Result<(), 
 fn from_c(buffer: &[c_char]) -> String {
     let bytes: Vec<u8> = buffer.iter().map(|&c| c as u8).take_while(|&b| b != 0).collect();
     let text = String::from_utf8(bytes).unwrap_or_else(|e| e.into_bytes().into_iter().map(char::from).collect());
-    text.trim_end().replace(char::is_control, " ")
+    spaced(text.trim_end())
 }
 
 /// A path as cfitsio takes it literally.
@@ -123,9 +158,9 @@ fn c_path(path: &Path) -> Result<CString, Error> {
     let path = if path.is_absolute() { path.to_owned() } else { Path::new(".").join(path) };
     let bytes = path.into_os_string().into_encoded_bytes();
     if bytes.len() > PATH_MAX {
-        return Err(Error::PathTooLong { bytes: bytes.len(), limit: PATH_MAX });
+        return Err(Problem::PathTooLong { bytes: bytes.len(), limit: PATH_MAX }.into());
     }
-    CString::new(bytes).map_err(|e| Error::Io { action: "open it", cause: e.into() })
+    CString::new(bytes).map_err(|e| Error::io("open it")(e.into()))
 }
 
 /// Text for cfitsio; callers have made it printable ASCII.
@@ -214,8 +249,8 @@ impl FitsReader {
                     let text = String::from_utf8_lossy(&card[9..]);
                     let value = text.split('/').next().unwrap_or_default().trim();
                     if !value.parse().is_ok_and(|value: i64| (0..=max).contains(&value)) {
-                        let value = value.replace(char::is_control, " ");
-                        return Err(Error::Keyword { hdu, key: key.to_owned(), value, expected: "a possible size" });
+                        let (key, value) = (key.to_owned(), spaced(value));
+                        return Err(Problem::Keyword { hdu, key, value, expected: "a possible size" }.into());
                     }
                 }
             }
@@ -239,14 +274,14 @@ impl FitsReader {
         let mut value = [0 as c_char; sys::FLEN_VALUE as usize];
         let mut comment = [0 as c_char; sys::FLEN_COMMENT as usize];
         // SAFETY: the handle is open; the buffers have the documented lengths.
-        let found = call(format_args!("read the keyword {key}"), |status| unsafe {
+        let status = status_of(|status| unsafe {
             sys::ffgkey(self.handle.0, name.as_ptr(), value.as_mut_ptr(), comment.as_mut_ptr(), status);
         });
-        match found {
-            Ok(()) => Ok(Some(from_c(&value))),
-            Err(Error::Cfitsio { status: KEY_NO_EXIST, .. }) => Ok(None),
-            Err(e) => Err(e),
+        if status == KEY_NO_EXIST {
+            return Ok(None);
         }
+        checked(status, format_args!("read the keyword {key}"), READING)?;
+        Ok(Some(from_c(&value)))
     }
 
     /// All keywords of the current HDU that have a value, with it as it is written there; texts over several lines are
@@ -267,7 +302,7 @@ impl FitsReader {
                 sys::ffgkyn(self.handle.0, line, key.as_mut_ptr(), value.as_mut_ptr(), comment.as_mut_ptr(), status);
             });
             match read {
-                Err(Error::Cfitsio { .. }) => continue,
+                Err(e) if e.kind() == ErrorKind::Unreadable => continue,
                 read => read?,
             }
             let (key, value) = (from_c(&key), from_c(&value));
@@ -302,7 +337,7 @@ impl FitsReader {
         });
         match read {
             Ok(()) => Ok(Some(format!("'{}'", from_c(&value).replace('\'', "''")))),
-            Err(Error::Cfitsio { .. }) => Ok(None),
+            Err(e) if e.kind() == ErrorKind::Unreadable => Ok(None),
             Err(e) => Err(e),
         }
     }

@@ -1,32 +1,85 @@
 //! Named columns of values at points, and the choice of the one that is to become a map.
 //!
-//! What else columns may be (coordinates, colours) is left to the adapters.
+//! Columns of coordinates and colours are left to the adapters.
 
+use crate::describe::{Description, FieldDescription, GridDescription, TableDescription, TablePlace};
+use crate::error::{Ask, ErrorKind, Reason};
 use crate::names::is_alike;
-use crate::{Description, Error, Field, FieldDescription, GridDescription, Selection, TableDescription, TablePlace};
+use crate::request::{self, Field, Selection};
+use crate::text::shortened;
+
+/// Problems with columns, and with the values in them.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Problem {
+    #[error("there is no column {field}; the columns of values are {columns}")]
+    UnknownColumn { field: String, columns: String },
+    #[error("several columns could be the map: {columns}; choose one by its name or number")]
+    SeveralColumns { columns: String },
+    #[error("there is no column of numbers besides {coordinates}; name the column of values")]
+    NoValueColumn { coordinates: String },
+    #[error("the points have no dimension '{dimension}' to choose from; leave the choice out, or pick the rows first")]
+    NoDimension { dimension: String },
+    #[error(transparent)]
+    Request(#[from] request::Problem),
+    #[error("{place} has '{text}' as '{column}', which is not {expected}; correct it")]
+    BadNumber { place: String, column: String, text: String, expected: &'static str },
+    #[error("column '{column}' has no value at any point; choose another")]
+    NoValues { column: String },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::UnknownColumn { .. } => ErrorKind::Unknown,
+            Problem::SeveralColumns { .. } => ErrorKind::Ambiguous,
+            Problem::NoValueColumn { .. } => ErrorKind::NoMap,
+            Problem::NoDimension { .. } => ErrorKind::NotApplicable,
+            Problem::Request(problem) => problem.kind(),
+            Problem::BadNumber { .. } => ErrorKind::Invalid,
+            Problem::NoValues { .. } => ErrorKind::NoValues,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        match self {
+            Problem::NoDimension { dimension } => Some(Ask::Place { dimension: Some(dimension.clone()), place: None }),
+            Problem::Request(problem) => problem.ask(),
+            Problem::BadNumber { .. } => None,
+            _ => Some(Ask::Variable),
+        }
+    }
+
+    fn found(&self) -> Option<String> {
+        match self {
+            Problem::BadNumber { place, text, .. } => Some(format!("'{text}' in {place}")),
+            Problem::NoValues { .. } => Some("without values".to_owned()),
+            _ => None,
+        }
+    }
+}
 
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Column {
-    /// Its heading, as the file has it.
+    /// The heading, as the file has it.
     pub(crate) heading: String,
-    /// Its name, which is the heading without a unit.
+    /// The name, which is the heading without a unit.
     pub(crate) name: String,
-    /// Its unit, where the heading has one.
+    /// The unit, where the heading has one.
     pub(crate) unit: Option<String>,
-    /// Whether it holds values that can be a map. Others are taken only if asked for by name.
+    /// Whether the column holds values that can be a map. Other columns are taken only if asked for by name.
     pub(crate) values: bool,
 }
 
-/// Number of the column that holds a field: that of this name, or the one of this number among those of values. Unless
-/// given it is the only one of values.
-pub(crate) fn choose(columns: &[Column], field: Option<&Field>) -> Result<usize, Error> {
+/// Number of the column that holds a field: the column of this name, or of this number among those of values. Unless a
+/// field is given it is the only column of values.
+pub(crate) fn choose(columns: &[Column], field: Option<&Field>) -> Result<usize, Problem> {
     let candidates: Vec<usize> = (0..columns.len()).filter(|&i| columns[i].values).collect();
-    let several = || Error::SeveralColumns { columns: listed(columns) };
+    let several = || Problem::SeveralColumns { columns: listed(columns) };
     match field {
         None if candidates.len() > 1 => Err(several()),
-        None => candidates.first().copied().ok_or_else(|| Error::NoValueColumn {
-            coordinates: columns.iter().map(|c| format!("'{}'", shown(&c.heading))).collect::<Vec<_>>().join(", "),
+        None => candidates.first().copied().ok_or_else(|| Problem::NoValueColumn {
+            coordinates: columns.iter().map(|c| format!("'{}'", shortened(&c.heading))).collect::<Vec<_>>().join(", "),
         }),
         Some(field) => {
             let found = match field {
@@ -36,7 +89,7 @@ pub(crate) fn choose(columns: &[Column], field: Option<&Field>) -> Result<usize,
                 }
             };
             match found[..] {
-                [] => Err(Error::UnknownColumn { field: field.to_string(), columns: listed(columns) }),
+                [] => Err(Problem::UnknownColumn { field: field.to_string(), columns: listed(columns) }),
                 [i] => Ok(i),
                 _ => Err(several()),
             }
@@ -53,9 +106,10 @@ fn named(columns: &[Column], name: &str) -> Vec<usize> {
     found.into_iter().find(|found| !found.is_empty()).unwrap_or_default()
 }
 
-/// What a file holds whose columns are these.
+/// The description of a file with these columns.
 pub(crate) fn describe(format: &'static str, grid: GridDescription, columns: &[Column]) -> Description {
-    let field = |c: &Column| FieldDescription { name: c.name.clone(), unit: c.unit.clone(), long_name: None };
+    let field =
+        |c: &Column| FieldDescription { name: c.name.clone(), unit: c.unit.clone(), long_name: None, quantity: None };
     let fields = columns.iter().filter(|c| c.values).map(field).collect();
     let table =
         TableDescription { place: TablePlace::File {}, grid, dimensions: Vec::new(), fields, cards: Vec::new() };
@@ -63,29 +117,17 @@ pub(crate) fn describe(format: &'static str, grid: GridDescription, columns: &[C
 }
 
 /// Whether a selection is one of points, which have neither dimensions nor HDUs.
-pub(crate) fn check(selection: &Selection) -> Result<(), Error> {
-    if let Some(hdu) = selection.hdu {
-        return Err(Error::NoHdus { hdu });
-    }
+pub(crate) fn check(selection: &Selection) -> Result<(), Problem> {
+    selection.without_hdu()?;
     let at = selection.at.first();
-    at.map_or(Ok(()), |at| Err(Error::NoDimension { dimension: shown(&at.dimension) }))
+    at.map_or(Ok(()), |at| Err(Problem::NoDimension { dimension: shortened(&at.dimension) }))
 }
 
 /// The columns of values with their numbers, for people.
 fn listed(columns: &[Column]) -> String {
     let values = columns.iter().filter(|c| c.values).enumerate();
-    let listed: Vec<_> = values.map(|(i, c)| format!("{i} '{}'", shown(&c.name))).collect();
+    let listed: Vec<_> = values.map(|(i, c)| format!("{i} '{}'", shortened(&c.name))).collect();
     if listed.is_empty() { "none".to_owned() } else { listed.join(", ") }
-}
-
-/// Text of a file as part of one sentence: on one line and not too long.
-pub(crate) fn shown(text: &str) -> String {
-    const LONGEST: usize = 60;
-    let mut shown: String = text.chars().take(LONGEST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
-    if shown.len() < text.len() && text.chars().count() > LONGEST {
-        shown.push('…');
-    }
-    shown
 }
 
 #[cfg(test)]
@@ -108,7 +150,7 @@ mod tests {
         ]
     }
 
-    fn chosen(field: &str) -> Result<usize, Error> {
+    fn chosen(field: &str) -> Result<usize, Problem> {
         choose(&columns(), Some(&field.parse().unwrap()))
     }
 
@@ -120,21 +162,15 @@ mod tests {
         assert_eq!(chosen("0").unwrap(), 1);
         assert_eq!(chosen("2").unwrap(), 3);
         assert_eq!(chosen("2024").unwrap(), 3);
-        assert!(matches!(chosen("depth"), Err(Error::SeveralColumns { .. })));
-        let Err(Error::UnknownColumn { columns, .. }) = chosen("height") else { panic!() };
+        assert!(matches!(chosen("depth"), Err(Problem::SeveralColumns { .. })));
+        let Err(Problem::UnknownColumn { columns, .. }) = chosen("height") else { panic!() };
         assert_eq!(columns, "0 'Depth', 1 'depth', 2 '2024', 3 'depth'");
     }
 
     #[test]
     fn the_only_column_needs_no_name() {
-        assert!(matches!(choose(&columns(), None), Err(Error::SeveralColumns { .. })));
+        assert!(matches!(choose(&columns(), None), Err(Problem::SeveralColumns { .. })));
         assert_eq!(choose(&columns()[..2], None).unwrap(), 1);
-        assert!(matches!(choose(&columns()[..1], None), Err(Error::NoValueColumn { .. })));
-    }
-
-    #[test]
-    fn text_is_shown_on_one_short_line() {
-        assert_eq!(shown("a\nb"), "a\u{fffd}b");
-        assert_eq!(shown(&"é".repeat(100)).chars().count(), 61);
+        assert!(matches!(choose(&columns()[..1], None), Err(Problem::NoValueColumn { .. })));
     }
 }

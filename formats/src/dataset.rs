@@ -1,10 +1,11 @@
 //! Files of named arrays with named dimensions and attributes, seen in one way whatever holds them: NetCDF, Zarr.
 //!
-//! What names and attributes mean (the CF conventions) is left to [`crate::cf`], what a grid is to the adapters.
+//! The meaning of names and attributes (the CF conventions) is left to [`crate::cf`], the grids to other files.
 
 use std::ops::Range;
 
-use crate::Error;
+use crate::error::{Ask, Error, ErrorKind, Reason};
+use crate::text::gibibytes;
 
 /// A file of named arrays.
 pub(crate) trait Dataset {
@@ -25,15 +26,15 @@ pub(crate) trait Dataset {
 /// A named array.
 #[derive(Clone, Debug)]
 pub(crate) struct Variable {
-    /// Its name within its group.
+    /// The name within the group.
     pub(crate) name: String,
-    /// The group that it is in: "/" or such as "/Grid".
+    /// The group of the variable: "/" or such as "/Grid".
     pub(crate) group: String,
-    /// What it holds.
+    /// The kind of the values.
     pub(crate) kind: Kind,
-    /// Its dimensions, slowest first.
+    /// The dimensions, slowest first.
     pub(crate) dimensions: Vec<Dimension>,
-    /// Its attributes, in the file's order.
+    /// The attributes, in the file's order.
     pub(crate) attributes: Vec<(String, Attribute)>,
 }
 
@@ -68,6 +69,47 @@ pub(crate) enum Attribute {
     Whole(Vec<i64>),
     /// Anything else, such as nested JSON in Zarr, as JSON.
     Json(serde_json::Value),
+}
+
+/// Problems with the variables of a dataset, whatever it means.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Problem {
+    #[error("'{variable}' needs {gibibytes:.1} GiB, more memory than there is; choose a part of it")]
+    Memory { variable: String, gibibytes: f64 },
+    #[error("variable '{variable}' holds {found}, which is not a field of numbers; choose another variable")]
+    VariableKind { variable: String, found: &'static str },
+    #[error(
+        "variable '{variable}' has {attribute} = {found}, which is not {expected}; correct it, such as with ncatted"
+    )]
+    AttributeValue { variable: String, attribute: &'static str, found: String, expected: &'static str },
+    #[error("there are several variables, so name one: {variables}")]
+    SeveralVariables { variables: String },
+}
+
+impl Problem {
+    /// Too little memory for a variable, or an attribute, of this many bytes.
+    pub(crate) fn memory(variable: String, bytes: f64) -> Self {
+        Problem::Memory { variable, gibibytes: gibibytes(bytes) }
+    }
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Memory { .. } => ErrorKind::NoMemory,
+            Problem::VariableKind { .. } => ErrorKind::NotNumbers,
+            Problem::AttributeValue { .. } => ErrorKind::Invalid,
+            Problem::SeveralVariables { .. } => ErrorKind::Ambiguous,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        match self {
+            Problem::Memory { .. } => Some(Ask::Place { dimension: None, place: None }),
+            Problem::VariableKind { .. } | Problem::SeveralVariables { .. } => Some(Ask::Variable),
+            Problem::AttributeValue { .. } => None,
+        }
+    }
 }
 
 /// Values of a variable.

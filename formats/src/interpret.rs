@@ -1,24 +1,28 @@
-//! The choice of what the arrays of a dataset are as maps, whatever file holds them.
+//! The maps in the arrays of a dataset: fields on HEALPix grids, then fields on grids of latitude and longitude.
 //!
-//! Each interpretation is left to its own module.
+//! Each of the two interpretations is left to a module of its own.
 
 use std::rc::Rc;
 
+use crate::adapter::MapSeries;
 use crate::dataset::Dataset;
-use crate::{Error, Maps, Selection, TableDescription, healpix_cf, latlon};
+use crate::describe::TableDescription;
+use crate::error::Error;
+use crate::request::Selection;
+use crate::{healpix_cf, latlon};
 
-/// Finds what is selected of a dataset.
+/// Finds the selected field of a dataset.
 ///
 /// # Errors
-/// Where no interpretation has what is selected, or it cannot be read.
-pub(crate) fn open(dataset: Rc<dyn Dataset>, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+/// Where no interpretation has the selected field, or it cannot be read.
+pub(crate) fn open(dataset: Rc<dyn Dataset>, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
     match healpix_cf::open(&dataset, selection)? {
         Some(maps) => Ok(maps),
         None => latlon::open(dataset, selection),
     }
 }
 
-/// What a dataset holds.
+/// Describes the fields of a dataset.
 ///
 /// # Errors
 /// Where it cannot be read or holds no map.

@@ -1,14 +1,18 @@
 //! Fields on regular and rectilinear grids of latitude and longitude, in any dataset, as maps.
 //!
-//! Which dimensions and coordinates a variable has, and what its numbers mean, is left to [`crate::cf`], how a grid
-//! becomes HEALPix to [`crate::regrid`].
+//! The dimensions and coordinates of a variable, and the meaning of its numbers, are left to [`crate::cf`], the way from
+//! a grid to HEALPix to [`longan_grid::Weights`].
 
 use std::rc::Rc;
 
+use crate::adapter::{About, MapSeries, MemoryEstimate};
 use crate::cf::{self, Horizontal};
-use crate::dataset::{Dataset, Kind, Variable};
+use crate::dataset::{self, Dataset, Kind, Variable};
+use crate::describe::{AxisDescription, GridDescription, TableDescription};
+use crate::error::{Ask, Error, ErrorKind, Reason};
 use crate::names::is_alike;
-use crate::{About, AxisDescription, Error, Field, GridDescription, Maps, Room, Selection, TableDescription};
+use crate::quantity::StatedQuantity;
+use crate::request::{Field, Selection};
 use longan_grid::regridded;
 use longan_grid::{Healpix, LatLon, Map, Method, Regridded, Sphere, Time, Weights};
 
@@ -19,22 +23,44 @@ const LISTED: usize = 24;
 /// is good to 3e-4 for longitudes at a spacing of 0.1°.
 const REGULAR_TOLERANCE: f64 = 1e-3;
 
+/// A dataset without the field that is asked for on a grid of latitude and longitude.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error(
+        "no variable is on a HEALPix grid, or has dimensions of latitude and longitude in degrees; the variables are {variables}"
+    )]
+    NoLatLon { variables: String },
+    #[error("there is no variable {variable} with latitude and longitude; those that have them are {variables}")]
+    UnknownVariable { variable: String, variables: String },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::NoLatLon { .. } => ErrorKind::NoMap,
+            Problem::UnknownVariable { .. } => ErrorKind::Unknown,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        matches!(self, Problem::UnknownVariable { .. }).then_some(Ask::Variable)
+    }
+}
+
 /// A variable on a grid of latitude and longitude.
 struct OnGrid {
-    /// Its place among the dataset's variables.
+    /// The variable's place among the dataset's.
     variable: usize,
     horizontal: Horizontal,
 }
 
-/// Finds what is selected of a dataset.
+/// Finds the selected field of a dataset.
 ///
 /// # Errors
 /// Where there is no such field on a grid of latitude and longitude, several could be meant, or a place along another
 /// dimension is missing.
-pub(crate) fn open(dataset: Rc<dyn Dataset>, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
-    if let Some(hdu) = selection.hdu {
-        return Err(Error::NoHdus { hdu });
-    }
+pub(crate) fn open(dataset: Rc<dyn Dataset>, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
+    selection.without_hdu()?;
     let OnGrid { variable, horizontal } = choose(&*dataset, selection.field.as_ref())?;
     let sphere = [horizontal.latitude, horizontal.longitude];
     let chosen = cf::select(&*dataset, &dataset.variables()[variable], &sphere, &selection.at)?;
@@ -46,7 +72,7 @@ pub(crate) fn open(dataset: Rc<dyn Dataset>, selection: &Selection) -> Result<Bo
     Ok(Box::new(Series { dataset, variable, horizontal, chosen, from, to, method, regridded, min_valid, weights }))
 }
 
-/// What a dataset holds on grids of latitude and longitude.
+/// Describes the fields of a dataset on grids of latitude and longitude.
 ///
 /// # Errors
 /// Where it cannot be read or holds no such field.
@@ -57,7 +83,7 @@ pub(crate) fn describe(dataset: &dyn Dataset) -> Result<Vec<TableDescription>, E
 /// The maps of one variable.
 struct Series {
     dataset: Rc<dyn Dataset>,
-    /// Its place among the dataset's variables.
+    /// The variable's place among the dataset's.
     variable: usize,
     horizontal: Horizontal,
     chosen: cf::Chosen,
@@ -70,7 +96,7 @@ struct Series {
     weights: Option<Weights>,
 }
 
-impl Maps for Series {
+impl MapSeries for Series {
     fn times(&self) -> &[Time] {
         self.chosen.times()
     }
@@ -82,10 +108,10 @@ impl Maps for Series {
     fn about(&self) -> About {
         let variable = &self.dataset.variables()[self.variable];
         let (name, unit) = (variable.name.clone(), variable.text("units").map(str::to_owned));
-        About { name, unit, coordinates: None, sphere: Sphere::Earth }
+        About { name, unit, coordinates: None, sphere: Sphere::Earth, quantity: StatedQuantity::of(variable) }
     }
 
-    fn room(&self) -> Option<Room> {
+    fn memory(&self) -> Option<MemoryEstimate> {
         let (values, pixels) = (self.from.values() as f64, self.to.pixels() as f64);
         let weights = match self.method {
             // Cells of a grid that lies askew on another.
@@ -95,7 +121,7 @@ impl Maps for Series {
         };
         // The field, twice; where each pixel's weights end; weights and places, in arrays that may have grown to twice
         // their length.
-        Some(Room::of(self.to, (16.0 * values + 8.0 * pixels + 24.0 * weights) as usize))
+        Some(MemoryEstimate::of(self.to, (16.0 * values + 8.0 * pixels + 24.0 * weights) as usize))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {
@@ -123,10 +149,9 @@ impl Maps for Series {
         }
         let (rows, columns) = (variable.dimensions[latitude].len, variable.dimensions[longitude].len);
         let mut turned = Vec::new();
-        turned.try_reserve_exact(values.len()).map_err(|_| Error::VariableMemory {
-            variable: variable.path(),
-            gibibytes: values.len() as f64 * 8.0 / f64::from(1 << 30),
-        })?;
+        turned
+            .try_reserve_exact(values.len())
+            .map_err(|_| dataset::Problem::memory(variable.path(), values.len() as f64 * 8.0))?;
         for row in 0..rows {
             turned.extend((0..columns).map(|column| values[column * rows + row]));
         }
@@ -171,11 +196,11 @@ fn candidates(dataset: &dyn Dataset) -> Result<Vec<OnGrid>, Error> {
         match Horizontal::of(dataset, variable) {
             Ok(Some(horizontal)) => found.push(OnGrid { variable: place, horizontal }),
             Ok(None) => {}
-            Err(error) => problem = problem.or(Some(error)),
+            Err(error) => problem = problem.or(Some(Error::from(error))),
         }
     }
     if found.is_empty() {
-        return Err(problem.unwrap_or_else(|| Error::NoLatLon { variables: listed(variables.iter()) }));
+        return Err(problem.unwrap_or_else(|| Problem::NoLatLon { variables: listed(variables.iter()) }.into()));
     }
     Ok(found)
 }
@@ -193,7 +218,7 @@ fn choose(dataset: &dyn Dataset, field: Option<&Field>) -> Result<OnGrid, Error>
             let Some(place) = places.next() else { continue };
             if places.next().is_some() {
                 let several = variables.iter().filter(|v| test(v));
-                return Err(Error::SeveralVariables { variables: listed(several) });
+                return Err(dataset::Problem::SeveralVariables { variables: listed(several) }.into());
             }
             if let Some(horizontal) = Horizontal::of(dataset, &variables[place])? {
                 return Ok(OnGrid { variable: place, horizontal });
@@ -207,8 +232,8 @@ fn choose(dataset: &dyn Dataset, field: Option<&Field>) -> Result<OnGrid, Error>
         _ => {
             let names = listed(candidates.iter().map(|on_grid| &variables[on_grid.variable]));
             Err(match field {
-                None => Error::SeveralVariables { variables: names },
-                Some(field) => Error::UnknownVariable { variable: field.to_string(), variables: names },
+                None => dataset::Problem::SeveralVariables { variables: names }.into(),
+                Some(field) => Problem::UnknownVariable { variable: field.to_string(), variables: names }.into(),
             })
         }
     }

@@ -1,9 +1,10 @@
 //! The edge to libnetcdf: files, groups, variables, attributes and values, safely.
 //!
-//! All `unsafe` for NetCDF is here. What names and attributes mean is left to others.
+//! All `unsafe` for NetCDF is here. The meaning of names and attributes is left to others.
 //!
 //! libnetcdf takes some names for addresses on the net (`http://...`, `file#mode=zarr`), so it is given nothing but
-//! absolute paths; and backslashes for slashes, so a path with one is reached by a link. It is not thread-safe: each call takes the lock that it shares with HDF5.
+//! absolute paths; and backslashes for slashes, so a path with one is reached by a link. The library is not thread-safe:
+//! each call takes the lock that it shares with HDF5.
 
 use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int};
@@ -14,8 +15,27 @@ use std::ptr;
 use hdf5_sys::h5e::{H5E_DEFAULT, H5Eset_auto2};
 use netcdf_sys as sys;
 
-use crate::Error;
-use crate::dataset::{Attribute, Dimension};
+use crate::dataset::{self, Attribute, Dimension};
+use crate::error::{Error, ErrorKind, Reason, Use};
+use crate::text::on_one_line;
+
+/// A refusal of libnetcdf.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Problem {
+    #[error("cannot {action}: the NetCDF library says \"{message}\"; {}", .use_of.remedy())]
+    Refused { action: String, message: String, use_of: Use },
+}
+
+/// The use of a file that is read.
+const READING: Use = Use::Reading("check the file with ncdump -h");
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Refused { use_of, .. } => use_of.kind(),
+        }
+    }
+}
 
 /// Buffers for names; libnetcdf's limit and the NUL.
 const NAME_LEN: usize = sys::NC_MAX_NAME as usize + 1;
@@ -33,7 +53,7 @@ pub(crate) struct GroupId(c_int);
 #[derive(Clone, Copy)]
 pub(crate) struct VariableId(c_int, c_int);
 
-/// What is known of a variable without its attributes.
+/// A variable without its attributes.
 pub(crate) struct VariableHead {
     pub(crate) id: VariableId,
     pub(crate) name: String,
@@ -87,7 +107,7 @@ fn call(action: impl Display, function: impl FnOnce() -> c_int) -> Result<(), Er
             // SAFETY: for any number libnetcdf gives a C string, which lives at least until the next call.
             let message = unsafe { CStr::from_ptr(sys::nc_strerror(status)) };
             let message = text(message.to_bytes().to_vec());
-            Err(Error::Netcdf { action: action.to_string(), message })
+            Err(Problem::Refused { action: action.to_string(), message, use_of: READING }.into())
         }
     }
 }
@@ -99,7 +119,7 @@ fn text(bytes: Vec<u8>) -> String {
 
 /// The name in a buffer that libnetcdf has filled, on one line.
 fn name(buffer: &[u8; NAME_LEN]) -> String {
-    text(buffer.iter().copied().take_while(|&b| b != 0).collect()).replace(char::is_control, "\u{fffd}")
+    on_one_line(text(buffer.iter().copied().take_while(|&b| b != 0).collect()))
 }
 
 /// A vector of `len` zeros, unless there is not the memory for it.
@@ -133,7 +153,7 @@ impl NetcdfReader {
             _folder = folder;
         }
         let path = CString::new(path.into_os_string().into_encoded_bytes());
-        let path = path.map_err(|e| Error::Io { action: "open it", cause: e.into() })?;
+        let path = path.map_err(|e| Error::io("open it")(e.into()))?;
         let mut id = 0;
         // SAFETY: `path` is a C string and `id` a place for the result, both valid during the call.
         call("open it", || unsafe { sys::nc_open(path.as_ptr(), sys::NC_NOWRITE, &mut id) })?;
@@ -315,9 +335,9 @@ fn read<T: Copy>(
 ) -> Result<Vec<T>, Error> {
     debug_assert!([part.start.len(), part.count.len()] == [variable.dimensions.len(); 2]);
     let values = part.values().and_then(|values| zeros(zero, values));
-    let mut values = values.ok_or_else(|| Error::VariableMemory {
-        variable: variable.name.clone(),
-        gibibytes: part.count.iter().map(|&n| n as f64).product::<f64>() * size_of::<T>() as f64 / f64::from(1 << 30),
+    let mut values = values.ok_or_else(|| {
+        let values: f64 = part.count.iter().map(|&n| n as f64).product();
+        dataset::Problem::memory(variable.name.clone(), values * size_of::<T>() as f64)
     })?;
     let (start, count) = (part.start.as_ptr(), part.count.as_ptr());
     call(format_args!("read variable '{}'", variable.name), || get(variable.id, start, count, values.as_mut_ptr()))?;
@@ -346,7 +366,7 @@ fn attribute(
     len: usize,
 ) -> Result<Option<Attribute>, Error> {
     let action = format!("read attribute '{}'", name(c_name));
-    let memory = || Error::VariableMemory { variable: name(c_name), gibibytes: len as f64 * 8.0 / f64::from(1 << 30) };
+    let memory = || dataset::Problem::memory(name(c_name), len as f64 * 8.0);
     let c_name = c_name.as_ptr().cast();
     // In all calls below group, variable and name are those of an attribute of an open file with `len` values.
     Ok(Some(match kind {

@@ -3,11 +3,11 @@
 //! Cells are named by UNIQ numbers (CF: nuniq), 4^(order + 1) + NESTED pixel number (Fernique et al. 2014, MOC 1.0), or
 //! by their place along the NESTED tree (CF: zuniq). They are sorted along the tree, so that overlaps show between
 //! neighbours, and each pixel of the grid is made in passing; nothing is ever held at a finer resolution than that of
-//! the grid. How a file holds them is left to its adapter.
+//! the grid. The way in which a file holds cells is left to its adapter.
 
 use rayon::prelude::*;
 
-use crate::Error;
+use crate::error::{Ask, Error, ErrorKind, Reason};
 use longan_grid::accumulate::{Accumulator, CHUNK};
 use longan_grid::{Healpix, Ordering};
 
@@ -17,13 +17,30 @@ const ORDER_MAX: u32 = 29;
 /// The finest Nside that a map is brought to without being asked for: 6 GiB.
 const UNASKED_MAX: usize = 8192;
 
-/// Why cells make no map.
+/// A resolution that a multi-order map cannot be brought to.
+#[derive(Debug, thiserror::Error)]
+#[error("a multi-order map can be brought to an Nside that is a power of two, from 1 to 2^29, not to {nside}")]
+struct Resolution {
+    nside: usize,
+}
+
+impl Reason for Resolution {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::OutOfRange
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        Some(Ask::Nside)
+    }
+}
+
+/// The reason why cells make no map. The sentence is the adapter's, who knows where the cells are.
 pub(crate) enum Problem {
     /// Two cells, by their UNIQ numbers, share an area.
     Overlap { first: u64, second: u64 },
     /// The finest cells have a finer Nside than is used without being asked for.
     TooFine { finest: usize, limit: usize },
-    /// Whatever else.
+    /// Any other problem, which is a sentence already.
     Other(Error),
 }
 
@@ -48,7 +65,7 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    pub(crate) fn order(&self) -> u32 {
+    fn order(&self) -> u32 {
         ORDER_MAX - self.place.trailing_zeros() / 2
     }
 
@@ -85,6 +102,11 @@ pub(crate) fn place_of_zuniq(zuniq: i128) -> Option<u64> {
     (place >> (finer + 1) < 12 << (2 * order)).then_some(place)
 }
 
+/// Nside of the finest of the cells at these places along the tree, 1 where there are none.
+pub(crate) fn finest(places: impl Iterator<Item = u64>) -> usize {
+    1 << places.map(|place| Cell { place, value: 0.0 }.order()).max().unwrap_or(0)
+}
+
 /// Brings cells to the resolution asked for, else to that of the finest of them.
 ///
 /// A pixel gets the mean over the cells in it, weighted by their area and without those that are masked; a pixel
@@ -97,9 +119,11 @@ pub(crate) fn gather(mut cells: Vec<Cell>, nside: Option<usize>) -> Result<Accum
         }
     }
 
-    let finest = 1 << cells.iter().map(Cell::order).max().unwrap_or(0);
+    let finest = finest(cells.iter().map(|cell| cell.place));
     let grid = match nside {
-        Some(nside) => Healpix::new(nside).ok().filter(|grid| grid.has_nested()).ok_or(Error::Resolution { nside })?,
+        Some(nside) => {
+            Healpix::new(nside).ok().filter(|grid| grid.has_nested()).ok_or(Error::from(Resolution { nside }))?
+        }
         None if finest > UNASKED_MAX => return Err(Problem::TooFine { finest, limit: UNASKED_MAX }),
         None => Healpix::new(finest)?,
     };

@@ -1,7 +1,7 @@
 //! HEALPix maps as CF NetCDF, one step in time after the other.
 //!
 //! The same input always gives the same bytes. Pixels are numbered in a coordinate variable as wide as the map, which
-//! CF recommends and other software looks for. What the values and attributes mean is left to the caller.
+//! CF recommends and other software looks for. The meaning of values and attributes is left to the caller.
 
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -10,12 +10,34 @@ use std::path::Path;
 use netcdf::{AttributeValue, Extent, FileMut, NcTypeDescriptor, VariableMut};
 use rayon::prelude::*;
 
+use crate::card::{Card, CardValue};
+use crate::error::{self, Error, ErrorKind, Reason, Use};
 use crate::libnetcdf;
-use crate::{Card, CardValue, Error};
+use crate::quantity::StatedQuantity;
+use crate::text::spaced;
 use longan_grid::accumulate::CHUNK;
 use longan_grid::{Healpix, Ordering, Time};
 
-/// What the steps of a file have in common.
+/// Maps that a NetCDF file cannot hold.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error(
+        "Nside {nside} is not a power of two, which HEALPix in NetCDF needs (its refinement level is log2 Nside); write FITS"
+    )]
+    RefinementLevel { nside: usize },
+    #[error(
+        "step {step} does not go with the file's columns and axis of time; give each step all columns and its time, or a file without such an axis one step"
+    )]
+    StepTime { step: usize },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::InvalidInput
+    }
+}
+
+/// The grid, columns and attributes that all steps of a file share.
 #[derive(Clone, Debug)]
 pub struct NetcdfLayout {
     /// The grid of all columns.
@@ -26,7 +48,7 @@ pub struct NetcdfLayout {
     pub float32: bool,
     /// The columns, each a data variable.
     pub columns: Vec<NetcdfColumn>,
-    /// What each step has one number of, each a variable without pixels.
+    /// The numbers that each step has one of, each a variable without pixels.
     pub numbers: Vec<NetcdfColumn>,
     /// The attributes of the file, whose names are the keys in lower case; their comments are not written.
     pub attributes: Vec<Card>,
@@ -37,12 +59,14 @@ pub struct NetcdfLayout {
 /// One column, or one number, of all steps.
 #[derive(Clone, Debug)]
 pub struct NetcdfColumn {
-    /// Its name. What is neither a letter of ASCII, a digit nor '_' is written as '_', since CF has no other names.
+    /// The name. Characters other than letters of ASCII, digits and '_' are written as '_', since CF has no other names.
     pub name: String,
-    /// Its unit; may be empty.
+    /// The unit; may be empty.
     pub unit: String,
-    /// What it is in words; may be empty.
+    /// A description in words; may be empty.
     pub long_name: String,
+    /// The quantity, if known.
+    pub quantity: Option<StatedQuantity>,
 }
 
 /// The axis of time, in the words of CF.
@@ -83,10 +107,10 @@ impl NetcdfWriter {
     /// Begins a file; inside of [`save()`](crate::save()), the one whose path it gives.
     ///
     /// # Errors
-    /// [`Error::RefinementLevel`], or [`Error::NetcdfWrite`].
+    /// [`ErrorKind::InvalidInput`] where Nside is not a power of two, or [`ErrorKind::Unwritable`].
     pub fn create(path: &Path, layout: NetcdfLayout) -> Result<Self, Error> {
         let grid = layout.grid;
-        let level = grid.depth().map_err(|_| Error::RefinementLevel { nside: grid.nside() })?;
+        let level = grid.depth().map_err(|_| Problem::RefinementLevel { nside: grid.nside() })?;
         // libnetcdf takes some relative paths for addresses on the net.
         let path = std::path::absolute(path).map_err(Error::io("write it"))?;
         libnetcdf::quiet();
@@ -103,21 +127,17 @@ impl NetcdfWriter {
     /// NaN where masked, its numbers, and its time where the file has an axis of it.
     ///
     /// # Errors
-    /// [`Error::ColumnLength`], [`Error::StepTime`], or [`Error::NetcdfWrite`].
+    /// [`ErrorKind::InvalidInput`] where the step does not suit the layout, or [`ErrorKind::Unwritable`].
     pub fn append(&mut self, columns: &[&[f64]], numbers: &[f64], time: Option<&Time>) -> Result<(), Error> {
         let (grid, axis) = (self.layout.grid, self.layout.time.is_some());
         let all = columns.len() == self.names.len() && numbers.len() == self.numbers.len();
         if axis != time.is_some() || !all || !axis && self.steps > 0 {
-            return Err(Error::StepTime { step: self.steps + 1 });
+            return Err(Problem::StepTime { step: self.steps + 1 }.into());
         }
         for (values, name) in columns.iter().zip(&self.names) {
             if values.len() != grid.pixels() {
-                return Err(Error::ColumnLength {
-                    column: name.clone(),
-                    found: values.len(),
-                    nside: grid.nside(),
-                    expected: grid.pixels(),
-                });
+                let (found, nside, expected) = (values.len(), grid.nside(), grid.pixels());
+                return Err(error::Problem::ColumnLength { column: name.clone(), found, nside, expected }.into());
             }
         }
         if let Some(time) = time {
@@ -146,7 +166,7 @@ impl NetcdfWriter {
     /// Completes the file.
     ///
     /// # Errors
-    /// [`Error::NetcdfWrite`].
+    /// [`ErrorKind::Unwritable`].
     pub fn finish(self) -> Result<(), Error> {
         self.file.close().map_err(refused("finish it"))
     }
@@ -267,17 +287,20 @@ impl NetcdfWriter {
 /// For `map_err`: a refusal of the NetCDF library.
 fn refused(action: impl Display) -> impl FnOnce(netcdf::Error) -> Error {
     move |error| {
-        let message = error.to_string().replace(char::is_control, " ");
-        Error::NetcdfWrite { action: action.to_string(), message }
+        let (action, message) = (action.to_string(), spaced(error));
+        libnetcdf::Problem::Refused { action, message, use_of: Use::Writing }.into()
     }
 }
 
-/// Says what a variable is.
+/// Writes unit and description of a variable.
 fn describe(variable: &mut VariableMut<'_>, column: &NetcdfColumn) -> netcdf::Result<()> {
-    for (attribute, text) in [("units", &column.unit), ("long_name", &column.long_name)] {
+    for (name, text) in [("units", &column.unit), ("long_name", &column.long_name)] {
         if !text.is_empty() {
-            variable.put_attribute(attribute, text.as_str())?;
+            variable.put_attribute(name, text.as_str())?;
         }
+    }
+    for Card { key, value, .. } in column.quantity.iter().flat_map(StatedQuantity::attributes) {
+        variable.put_attribute(&key, attribute(&value))?;
     }
     Ok(())
 }

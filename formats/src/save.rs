@@ -1,9 +1,10 @@
 //! The one place that puts a finished file where it belongs.
 //!
 //! A file is written in a temporary folder beside its destination and renamed when complete, so that whoever looks
-//! sees the old file, or none, or the whole new one. What a killed process leaves is removed by the next that writes
-//! the same file. What is written is left to others.
+//! sees the old file, or none, or the whole new one. The remains of a killed process are removed by the next that writes
+//! the same file. The content of files is left to others.
 
+use std::any::Any;
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -12,61 +13,98 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tempfile::{TempDir, TempPath};
 
-use crate::Error;
+use crate::error::{self, Ask, Error, ErrorKind, Reason};
+use crate::text::on_one_line;
+
+/// A destination that cannot be written to.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error("the file exists; choose another name, or overwrite it")]
+    Exists,
+    #[error("the folder {} does not exist; create it first", on_one_line(.folder.display()))]
+    NoFolder { folder: PathBuf },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Exists => ErrorKind::Exists,
+            Problem::NoFolder { .. } => ErrorKind::NotFound,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        matches!(self, Problem::Exists).then_some(Ask::Overwrite)
+    }
+}
 
 /// Writes a file, all or nothing.
 ///
-/// `write` gets the path of a file to create, which has the final file's name but lies in a temporary folder.
+/// `write` gets the path of a file to create, which has the final file's name but lies in a temporary folder. The error
+/// of `write` may be of any type that an [`Error`] becomes, such as that of an application.
 ///
 /// # Errors
-/// [`Error::File`] around those of [`check_writable`], those of `write`, and the operating system's.
-pub fn save(path: &Path, overwrite: bool, write: impl FnOnce(&Path) -> Result<(), Error>) -> Result<(), Error> {
-    place(path, overwrite, write).map_err(|e| e.of(path))
+/// Those of [`check_writable`], those of `write`, and the operating system's. An [`Error`] names the file; an error of
+/// another type passes as `write` gave it, so that [`Error::with_path`] is left to `write`.
+pub fn save<E: From<Error> + 'static>(
+    path: &Path,
+    overwrite: bool,
+    write: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    let named = |e: Error| E::from(e.with_path(path));
+    let to = destination(path, overwrite).map_err(named)?;
+    let folder = temporary_folder(&to).map_err(named)?;
+    let file = folder.path().join(to.file_name().unwrap_or(OsStr::new("file")));
+    write(&file).map_err(|e| of_final_file(e, &file, path))?;
+    put(file, &to, overwrite).map_err(named)
+}
+
+/// An error of this crate that names the final file, since the temporary one is none of the user's concern. An error of
+/// another type is not changed.
+fn of_final_file<E: 'static>(mut error: E, temporary: &Path, path: &Path) -> E {
+    if let Some(error) = (&mut error as &mut dyn Any).downcast_mut::<Error>() {
+        error.rename(temporary, path);
+    }
+    error
 }
 
 /// Whether [`save()`] would be able to write this file, to be asked before a long computation.
 ///
 /// # Errors
-/// [`Error::File`], which names the file, where its folder does not exist or cannot be written to, where it is a
-/// folder or a device, and where it exists but may not be overwritten.
+/// [`ErrorKind::NotFound`] where the folder does not exist, [`ErrorKind::Io`] where it cannot be written to,
+/// [`ErrorKind::NotAFile`] where the path is that of a folder or a device, and [`ErrorKind::Exists`] where the file
+/// exists but may not be overwritten. The error names the file.
 pub fn check_writable(path: &Path, overwrite: bool) -> Result<(), Error> {
-    destination(path, overwrite).and_then(|to| temporary_folder(&to)).map(drop).map_err(|e| e.of(path))
+    destination(path, overwrite).and_then(|to| temporary_folder(&to)).map(drop).map_err(|e| e.with_path(path))
 }
 
-fn place(path: &Path, overwrite: bool, write: impl FnOnce(&Path) -> Result<(), Error>) -> Result<(), Error> {
-    let to = destination(path, overwrite)?;
-    let folder = temporary_folder(&to)?;
-    let file = folder.path().join(to.file_name().unwrap_or(OsStr::new("file")));
-    write(&file).map_err(|e| match e {
-        // The temporary file is none of the user's concern.
-        Error::File { path, problem } if path == file => *problem,
-        e => e,
-    })?;
+/// Puts a finished file in its place.
+fn put(file: PathBuf, to: &Path, overwrite: bool) -> Result<(), Error> {
     let file = TempPath::try_from_path(file).map_err(Error::io("write it"))?;
-    let placed = if overwrite { file.persist(&to) } else { file.persist_noclobber(&to) };
+    let placed = if overwrite { file.persist(to) } else { file.persist_noclobber(to) };
     placed.map_err(|e| match e.error.kind() {
-        io::ErrorKind::AlreadyExists => Error::Exists,
+        io::ErrorKind::AlreadyExists => Problem::Exists.into(),
         _ => Error::io("put it in its place")(e.error),
     })
 }
 
-/// Where the file really goes, once it is clear that it may.
+/// The place where the file really goes, once it is clear that it may.
 fn destination(path: &Path, overwrite: bool) -> Result<PathBuf, Error> {
     let to = match fs::metadata(path) {
-        Ok(old) if old.is_dir() => return Err(Error::Folder),
-        Ok(old) if !old.is_file() => return Err(Error::NotRegular),
-        Ok(_) if !overwrite => return Err(Error::Exists),
+        Ok(old) if old.is_dir() => return Err(error::Problem::Folder.into()),
+        Ok(old) if !old.is_file() => return Err(error::Problem::NotRegular.into()),
+        Ok(_) if !overwrite => return Err(Problem::Exists.into()),
         // Behind a symbolic link, the file is replaced and not the link.
         Ok(_) => fs::canonicalize(path).map_err(Error::io("follow its link"))?,
         Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_owned(),
-        Err(cause) => return Err(Error::Io { action: "write it", cause }),
+        Err(cause) => return Err(error::Problem::Io { action: "write it", cause }.into()),
     };
     if to.file_name().is_none() || path.as_os_str().as_encoded_bytes().ends_with(b"/") {
-        return Err(Error::Folder);
+        return Err(error::Problem::Folder.into());
     }
     let folder = folder_of(&to);
     if !folder.is_dir() {
-        return Err(Error::NoFolder { folder: folder.to_owned() });
+        return Err(Problem::NoFolder { folder: folder.to_owned() }.into());
     }
     Ok(to)
 }
@@ -78,7 +116,7 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// What folders for unfinished files begin with; the name of what is written follows.
+/// The beginning of names of folders for unfinished files; the name of the file follows.
 const PREFIX: &str = ".longan-";
 
 /// Bytes of a file's name that are kept in that of its folder, so that this is not too long; names that begin alike
@@ -90,7 +128,7 @@ const LOCK: &str = "lock";
 
 /// A folder of one's own for an unfinished file, which goes with all that is in it.
 ///
-/// It lies in a folder that all who write the same output share. Each of them holds the lock there, shared; the system
+/// The folder lies in another that all who write the same output share. Each of them holds the lock there, shared; the system
 /// frees it when a process ends, however it ends. So whoever gets it alone knows that what else lies there is nobody's,
 /// and removes it. Nothing but tidiness hangs on that: where locks do not work, what killed processes leave stays, and
 /// two that write the same output have folders of their own anyway.
@@ -164,7 +202,7 @@ impl Place {
     }
 }
 
-/// What comes of taking a shared folder's lock.
+/// The outcome of taking a shared folder's lock.
 enum Claim {
     /// The lock, had alone or not at all.
     Locks(File),
@@ -234,8 +272,7 @@ fn shared_folder(to: &Path) -> PathBuf {
     folder_of(to).join(format!("{PREFIX}{}", &name[..end]))
 }
 
-/// Removes what processes that were killed while they wrote this file have left beside it. What is being written now
-/// stays.
+/// Removes the remains that killed processes have left beside this file. Files that are being written now stay.
 pub fn tidy(path: &Path) {
     let to = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let shared = shared_folder(&to);
@@ -254,8 +291,8 @@ fn folders() -> MutexGuard<'static, Vec<Arc<Place>>> {
 fn temporary_folder(to: &Path) -> Result<Temporary, Error> {
     let mut folders = folders();
     // Without the temporary folder's own name, which tells a user nothing.
-    let place =
-        Place::new(to).map_err(|cause| Error::Io { action: "write to its folder", cause: cause.kind().into() })?;
+    let refused = |cause: io::Error| error::Problem::Io { action: "write to its folder", cause: cause.kind().into() };
+    let place = Place::new(to).map_err(refused)?;
     let place = Arc::new(place);
     folders.push(place.clone());
     Ok(Temporary(place))

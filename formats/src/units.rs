@@ -3,7 +3,7 @@
 //! Spellings differ more than units do: `µK`, `uK` and `muK`; `K_CMB` and `Kcmb`; `m s**-1` and `m/s`. Nothing is
 //! converted here.
 
-/// What follows the kelvin of a brightness: whether it is thermodynamic or of Rayleigh and Jeans.
+/// The words that follow the kelvin of a brightness: whether it is thermodynamic or of Rayleigh and Jeans.
 const KINDS: [&str; 3] = ["cmb", "rj", "thermo"];
 
 /// Whether two units contradict each other. A unit without any letter says nothing and contradicts none, and a plain `K`

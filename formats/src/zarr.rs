@@ -1,7 +1,7 @@
 //! Zarr stores, version 2 and 3, in folders.
 //!
-//! Which arrays and groups there are is found here, from consolidated metadata where a store has them, else from its
-//! folders. Chunks and codecs are left to `zarrs`; what names and attributes mean to [`crate::cf`], what a map is to
+//! Arrays and groups are found here, from consolidated metadata where a store has them, else from its folders. Chunks
+//! and codecs are left to `zarrs`, the meaning of names and attributes to [`crate::cf`], the maps to
 //! [`crate::interpret`].
 
 use std::cell::RefCell;
@@ -19,8 +19,40 @@ use zarrs::array::chunk_cache::{ChunkCache, ChunkCacheDecodedLruSizeLimit};
 use zarrs::array::{ArrayMetadata, ArraySubset, CodecOptions, ElementOwned};
 use zarrs::filesystem::FilesystemStore;
 
+use crate::adapter::{Adapter, MapSeries};
 use crate::dataset::{Array, Attribute, Dataset, Dimension, Kind, Variable};
-use crate::{Adapter, Description, Error, Maps, Selection, interpret, zarr_zstd};
+use crate::describe::Description;
+use crate::error::{self, Ask, Error, ErrorKind, Reason};
+use crate::request::Selection;
+use crate::text::{gibibytes, spaced};
+use crate::{interpret, zarr_zstd};
+
+/// A Zarr store, or an array of one, that cannot be read.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error("the metadata of {node} in this Zarr store is wrong ({problem}); fetch or write the store again")]
+    Metadata { node: String, problem: String },
+    #[error("cannot read the array '{array}': the Zarr library says \"{message}\"; check the store with zarr-python")]
+    Refused { array: String, message: String },
+    #[error(
+        "the part of array '{array}' that is needed, or a chunk of it, has {gibibytes:.1} GiB, more memory than there is; select less of it, or rechunk the store"
+    )]
+    Memory { array: String, gibibytes: f64 },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Metadata { .. } => ErrorKind::Corrupt,
+            Problem::Refused { .. } => ErrorKind::Unreadable,
+            Problem::Memory { .. } => ErrorKind::NoMemory,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        matches!(self, Problem::Memory { .. }).then_some(Ask::Place { dimension: None, place: None })
+    }
+}
 
 /// Metadata of a node of version 3; of all nodes, where they are consolidated.
 const V3_NODE: &str = "zarr.json";
@@ -62,7 +94,7 @@ impl Adapter for ZarrStore {
         Ok(Description { format: self.name(), tables })
     }
 
-    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
         interpret::open(Rc::new(Zarr::open(path)?), selection)
     }
 }
@@ -82,11 +114,11 @@ pub(crate) struct Zarr {
 /// Chunks that are decoded, the last ones that were needed.
 type Cache = ChunkCacheDecodedLruSizeLimit;
 
-/// How an array is stored.
+/// The storage of an array.
 struct Stored {
-    /// Its path in the store, "/" for a store that is one array.
+    /// The array's path in the store, "/" for a store that is one array.
     path: String,
-    /// Its metadata, without attributes.
+    /// The array's metadata, without attributes.
     metadata: Value,
     /// The type of its elements, as version 3 calls it.
     element: &'static str,
@@ -96,7 +128,7 @@ struct Stored {
 struct Node {
     /// "/" or such as "/a/b".
     path: String,
-    /// Its metadata; of version 2 without attributes.
+    /// The node's metadata; of version 2 without attributes.
     metadata: Value,
     attributes: Map<String, Value>,
     is_array: bool,
@@ -107,7 +139,7 @@ impl Zarr {
     pub(crate) fn open(folder: &Path) -> Result<Self, Error> {
         zarr_zstd::register();
         let storage = FilesystemStore::new(folder)
-            .map_err(|e| Error::ZarrMetadata { node: "the root".to_owned(), problem: one_line(&e) })?;
+            .map_err(|e| Problem::Metadata { node: "the root".to_owned(), problem: spaced(e) })?;
         let mut zarr = Zarr {
             storage: Arc::new(storage),
             variables: vec![],
@@ -139,20 +171,20 @@ impl Dataset for Zarr {
     }
 
     fn read(&self, variable: &Variable, ranges: &[Range<usize>]) -> Result<Array, Error> {
-        let refused = |message: String| Error::Zarr { array: variable.path(), message };
+        let refused = |message: String| Problem::Refused { array: variable.path(), message };
         let place = self.variables.iter().position(|v| v.name == variable.name && v.group == variable.group);
         let stored = &self.arrays[place.ok_or_else(|| refused("there is no such array".to_owned()))?];
         let metadata: ArrayMetadata =
-            serde_json::from_value(stored.metadata.clone()).map_err(|e| refused(one_line(&e)))?;
+            serde_json::from_value(stored.metadata.clone()).map_err(|e| refused(spaced(e)))?;
         let array = zarrs::array::Array::new_with_metadata(self.storage.clone(), &stored.path, metadata)
-            .map_err(|e| refused(one_line(&e)))?;
+            .map_err(|e| refused(spaced(e)))?;
 
-        let chunk = array.chunk_shape(&vec![0; ranges.len()]).map_err(|e| refused(one_line(&e)))?;
+        let chunk = array.chunk_shape(&vec![0; ranges.len()]).map_err(|e| refused(spaced(e)))?;
         let chunk: Vec<_> = chunk.iter().map(|len| len.get()).collect();
         let product = |lens: &mut dyn Iterator<Item = u64>| lens.fold(1u128, |n, len| n.saturating_mul(len.into()));
         let ranges: Vec<_> = ranges.iter().map(|range| range.start as u64..range.end as u64).collect();
         let part = product(&mut ranges.iter().map(|range| range.end - range.start));
-        room(variable, part.max(product(&mut chunk.iter().copied())))?;
+        check_memory(variable, part.max(product(&mut chunk.iter().copied())))?;
 
         // Chunks of several steps are needed again for the next one.
         let again = ranges.iter().zip(&chunk).any(|(range, chunk)| range.end - range.start < *chunk);
@@ -192,7 +224,7 @@ impl Dataset for Zarr {
             "float32" => Array::Real(part.values::<f32>()?.into_iter().map(f64::from).collect()),
             "float64" => Array::Real(part.values::<f64>()?),
             "string" => Array::Text(part.values::<String>()?),
-            _ => return Err(refused("its elements are neither numbers nor text".to_owned())),
+            _ => return Err(refused("its elements are neither numbers nor text".to_owned()).into()),
         })
     }
 }
@@ -214,7 +246,7 @@ impl Part<'_> {
             Some(cache) => cache.retrieve_array_subset(&self.subset, &CodecOptions::default()),
             None => self.array.retrieve_array_subset(&self.subset),
         };
-        read.map_err(|e| Error::Zarr { array: self.variable.path(), message: one_line(&e) })
+        Ok(read.map_err(|e| Problem::Refused { array: self.variable.path(), message: spaced(e) })?)
     }
 
     fn whole<T: ElementOwned + Into<i64>>(&self) -> Result<Array, Error> {
@@ -223,12 +255,12 @@ impl Part<'_> {
 }
 
 /// Whether there is memory for this many elements, for which `zarrs` does not ask.
-fn room(variable: &Variable, elements: u128) -> Result<(), Error> {
+fn check_memory(variable: &Variable, elements: u128) -> Result<(), Problem> {
     // No element is wider than 8 bytes.
     let bytes = elements.saturating_mul(8);
     let there_is = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
-    let gibibytes = bytes as f64 / f64::from(1 << 30);
-    if there_is { Ok(()) } else { Err(Error::ZarrMemory { array: variable.path(), gibibytes }) }
+    let too_large = || Problem::Memory { array: variable.path(), gibibytes: gibibytes(bytes as f64) };
+    if there_is { Ok(()) } else { Err(too_large()) }
 }
 
 /// All nodes of a store, groups before what they hold.
@@ -244,7 +276,7 @@ fn nodes(folder: &Path) -> Result<Vec<Node>, Error> {
         }
     } else if let Some(Value::Object(mut all)) = json(folder, V2_ALL)? {
         let Some(Value::Object(mut all)) = all.remove("metadata") else {
-            return Err(wrong(V2_ALL, "it has no object 'metadata'"));
+            return Err(wrong(V2_ALL, "it has no object 'metadata'").into());
         };
         let keys: Vec<_> = all.keys().cloned().collect();
         let mut nodes = Vec::new();
@@ -297,17 +329,18 @@ fn json(folder: &Path, name: &str) -> Result<Option<Value>, Error> {
     let bytes = match fs::read(folder.join(name)) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(cause) => return Err(Error::Io { action: "read the store's metadata", cause }),
+        Err(cause) => return Err(error::Problem::Io { action: "read the store's metadata", cause }.into()),
     };
     let file = || folder.file_name().map(|folder| format!("{}/{name}", folder.to_string_lossy())).unwrap_or_default();
-    serde_json::from_slice(&bytes).map(Some).map_err(|e| wrong(&one_line(&file()), &format!("it is no JSON: {e}")))
+    let json = serde_json::from_slice(&bytes);
+    Ok(Some(json.map_err(|e| wrong(&spaced(file()), &format!("it is no JSON: {e}")))?))
 }
 
-fn v3_node(path: String, mut metadata: Value) -> Result<Node, Error> {
+fn v3_node(path: String, mut metadata: Value) -> Result<Node, Problem> {
     let is_array = match metadata.get("node_type").and_then(Value::as_str) {
         Some("array") => true,
         Some("group") => false,
-        _ => return Err(wrong(&one_line(&path), "node_type is neither \"array\" nor \"group\"")),
+        _ => return Err(wrong(&spaced(&path), "node_type is neither \"array\" nor \"group\"")),
     };
     let attributes = metadata.get_mut("attributes").map(Value::take);
     Ok(Node { path, metadata, attributes: object(attributes), is_array })
@@ -324,12 +357,12 @@ fn object(attributes: Option<Value>) -> Map<String, Value> {
     }
 }
 
-/// What an array is; one that is the whole store has the store's name.
-fn array(node: Node, store: &str) -> Result<(Variable, Stored), Error> {
+/// An array as a variable, and its storage; an array that is the whole store has the store's name.
+fn array(node: Node, store: &str) -> Result<(Variable, Stored), Problem> {
     let Node { path, mut metadata, attributes: mut given, .. } = node;
     let (group, name) = path.rsplit_once('/').unwrap_or_default();
     let name = if name.is_empty() { store } else { name };
-    let wrong = |problem: &str| wrong(&format!("array '{}'", one_line(&path)), problem);
+    let wrong = |problem: &str| wrong(&format!("array '{}'", spaced(&path)), problem);
     // Such a path leads out of the store.
     if path != "/" && path[1..].split('/').any(|part| matches!(part, "" | "." | "..")) {
         return Err(wrong("its path is not one of names"));
@@ -451,11 +484,6 @@ fn attribute(value: Value) -> Attribute {
     }
 }
 
-fn wrong(node: &str, problem: &str) -> Error {
-    Error::ZarrMetadata { node: node.to_owned(), problem: problem.to_owned() }
-}
-
-/// The words of an error, or a name, on one line.
-fn one_line(words: &impl ToString) -> String {
-    words.to_string().replace(char::is_control, " ")
+fn wrong(node: &str, problem: &str) -> Problem {
+    Problem::Metadata { node: node.to_owned(), problem: problem.to_owned() }
 }

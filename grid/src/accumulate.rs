@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
+use crate::map::reserved;
 use crate::{Error, Healpix, Map, Ordering};
 
-/// Values to handle at once: many enough that calls cost nothing, few enough to stay in the cache.
-pub const CHUNK: usize = 1 << 17;
+pub use crate::map::CHUNK;
 
 /// A map under construction: values come in their source's ordering and are put where RING order has them.
 #[derive(Debug)]
@@ -34,12 +34,7 @@ impl Accumulator {
     /// # Errors
     /// [`Error::Memory`] where there is not the memory for it.
     pub fn reserved(grid: Healpix, ordering: Ordering) -> Result<Self, Error> {
-        let mut values = Vec::new();
-        values.try_reserve_exact(grid.pixels()).map_err(|_| Error::Memory {
-            nside: grid.nside(),
-            gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
-        })?;
-        Ok(Accumulator { grid, ordering, values })
+        Ok(Accumulator { grid, ordering, values: reserved(grid)? })
     }
 
     /// Sets some pixels, named by `places` in the source's ordering, which this overwrites.

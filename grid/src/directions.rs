@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use crate::map::reserved;
 use crate::{Error, Healpix, Map};
 
 /// A unit vector.
@@ -32,13 +33,16 @@ const NEGLIGIBLE: f64 = 1e-60;
 /// about as far as the square root of the area that there is for each point; nearer ones vary more.
 const NEIGHBOUR: usize = 4;
 
-/// The finest Nside that is used without being asked for: 12.6 million pixels, 100 MB.
-const FINEST: usize = 1 << 10;
-
 /// The direction to a longitude and latitude in radians.
 pub fn at(longitude: f64, latitude: f64) -> Direction {
     let ((sin_lon, cos_lon), (sin_lat, cos_lat)) = (longitude.sin_cos(), latitude.sin_cos());
     [cos_lat * cos_lon, cos_lat * sin_lon, sin_lat]
+}
+
+/// The direction to a colatitude and longitude in radians; near the poles it keeps digits that a latitude has not.
+pub fn at_colatitude(theta: f64, phi: f64) -> Direction {
+    let ((sin, cos), (sin_phi, cos_phi)) = (theta.sin_cos(), phi.sin_cos());
+    [sin * cos_phi, sin * sin_phi, cos]
 }
 
 /// The direction from a centre to a point and their distance; nothing where they are the same.
@@ -152,20 +156,9 @@ pub(crate) fn spacing(places: &RTree<Numbered>) -> Option<f64> {
     (!squares.is_empty()).then(|| angle(*squares.select_nth_unstable_by(middle, f64::total_cmp).1))
 }
 
-/// The Nside, a power of two, of the pixels whose size is closest to a distance; no finer than the finest that is used
-/// unasked.
-pub(crate) fn closest_nside(spacing: f64) -> usize {
-    let depth = (Healpix::BASE.pixel_side() / spacing).log2().round();
-    1 << (depth.clamp(0.0, f64::from(FINEST.ilog2())) as u32)
-}
-
 /// A map of what a function says of the direction to each pixel's centre; what is not finite is masked.
 pub(crate) fn chart(grid: Healpix, value: impl Fn(usize, Direction) -> f64 + Sync) -> Result<Map, Error> {
-    let mut values = Vec::new();
-    values.try_reserve_exact(grid.pixels()).map_err(|_| Error::Memory {
-        nside: grid.nside(),
-        gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
-    })?;
+    let mut values = reserved(grid)?;
     values.resize(grid.pixels(), f64::NAN);
     values.par_iter_mut().enumerate().for_each(|(pixel, out)| {
         let found = value(pixel, of_pixel(grid, pixel));
@@ -235,18 +228,5 @@ mod tests {
         assert_eq!(spacing(&places(std::iter::empty())), None);
         let pair = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
         assert!((spacing(&places(pair.into_iter())).unwrap() - FRAC_PI_2).abs() < 1e-15);
-    }
-
-    #[test]
-    fn the_pixel_closest_to_a_spacing() {
-        for nside in [1usize, 2, 64, 1024] {
-            let size = Healpix::new(nside).unwrap().pixel_side();
-            for factor in [0.72, 1.0, 1.4] {
-                let expected = if nside == 1024 && factor < 1.0 { 1024 } else { nside };
-                assert_eq!(closest_nside(size * factor), expected);
-            }
-        }
-        assert_eq!(closest_nside(PI), 1);
-        assert_eq!(closest_nside(1e-12), 1024);
     }
 }

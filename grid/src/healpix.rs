@@ -10,6 +10,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::Error;
 
+/// The finest Nside that is used without being asked for: 12.6 million pixels, 100 MB.
+const FINEST: usize = 1 << 10;
+
 /// How the pixels of a file are numbered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "UPPERCASE")]
@@ -179,6 +182,13 @@ impl Healpix {
     }
 }
 
+/// The Nside, a power of two, of the pixels whose size is closest to a distance; no finer than the finest that is used
+/// unasked.
+pub(crate) fn closest_nside(spacing: f64) -> usize {
+    let depth = (Healpix::BASE.pixel_side() / spacing).log2().round();
+    1 << (depth.clamp(0.0, f64::from(FINEST.ilog2())) as u32)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -221,5 +231,18 @@ mod tests {
         assert_eq!(Healpix::with_pixels(12 * 9).map(Healpix::nside), Some(3));
         assert_eq!(Healpix::with_pixels(0), None);
         assert_eq!(Healpix::with_pixels(100), None);
+    }
+
+    #[test]
+    fn the_pixel_closest_to_a_spacing() {
+        for nside in [1usize, 2, 64, 1024] {
+            let size = Healpix::new(nside).unwrap().pixel_side();
+            for factor in [0.72, 1.0, 1.4] {
+                let expected = if nside == 1024 && factor < 1.0 { 1024 } else { nside };
+                assert_eq!(closest_nside(size * factor), expected);
+            }
+        }
+        assert_eq!(closest_nside(PI), 1);
+        assert_eq!(closest_nside(1e-12), 1024);
     }
 }

@@ -2,8 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::accumulate::{Accumulator, CHUNK};
 use crate::{Error, Healpix, Ordering, Regridded};
+
+/// Values to handle at once: many enough that calls cost nothing, few enough to stay in the cache.
+pub const CHUNK: usize = 1 << 17;
 
 /// HEALPix's marker for "no value here".
 pub const UNSEEN: f64 = -1.6375e30;
@@ -182,7 +184,8 @@ impl Map {
             let (theta, phi) = grid.centre(pixel);
             self.values[self.grid.pixel_at(theta, phi)]
         };
-        let mut values = Accumulator::new(grid, Ordering::Ring)?.values;
+        let mut values = reserved(grid)?;
+        values.resize(grid.pixels(), f64::NAN);
         if self.grid.nside() > grid.nside() {
             let mut counts = vec![Count::default(); grid.pixels()];
             for (start, values) in (0..).step_by(CHUNK).zip(self.values.chunks(CHUNK)) {
@@ -244,6 +247,19 @@ impl Count {
         let mean = if self.present > 0 { self.sum / f64::from(self.all) } else { f64::NAN };
         (self.all > 0).then_some(mean)
     }
+}
+
+/// The memory for the values of a grid, none of them there yet.
+///
+/// # Errors
+/// [`Error::Memory`] where there is not the memory for it.
+pub(crate) fn reserved(grid: Healpix) -> Result<Vec<f64>, Error> {
+    let mut values = Vec::new();
+    values.try_reserve_exact(grid.pixels()).map_err(|_| Error::Memory {
+        nside: grid.nside(),
+        gibibytes: grid.pixels() as f64 * 8.0 / f64::from(1 << 30),
+    })?;
+    Ok(values)
 }
 
 /// Whether a value means "no value": not finite, or within [`BAD_DATA_TOLERANCE`] of the marker.

@@ -8,9 +8,8 @@ use std::f64::consts::{LN_2, PI};
 use ndarray::{ArrayView1, ArrayView2};
 use rstar::{PointDistance, RTree};
 
-use crate::directions::{
-    self, Direction, Numbered, angle, chart, chord, closest_nside, nearest, pixel_at, places, spacing, tree,
-};
+use crate::directions::{self, Direction, Numbered, angle, chart, chord, nearest, pixel_at, places, spacing, tree};
+use crate::healpix::closest_nside;
 use crate::{Error, Gather, Healpix, Map, Regrid, Regridded, regridded};
 
 /// A Gaussian is cut at this many standard deviations, where its weight is 1.5e-8, below the rounding of
@@ -19,13 +18,6 @@ const CUT: f64 = 6.0;
 
 /// Pixels farther than this many times the typical distance from any point are masked, unless a reach is given.
 const REACH: f64 = 2.0;
-
-/// Where pixels are finer than points lie, they are smoothed by a Gaussian of this many times the typical distance, unless
-/// another way is asked for. Among points at random, the contours of a Gaussian field whose correlation angle is four and
-/// eight distances come out 2 % and 0.3 % too short, with the mean and the nearest point 29 % too long. At 1.5 times the
-/// distance they are 1 % and 2 % too long: how points happen to lie shows. What is smaller is lost, 12 % of the contours
-/// where the correlation angle is but two distances.
-pub(crate) const SMOOTH: f64 = 2.0;
 
 /// How points become a map.
 struct Plan {

@@ -13,7 +13,8 @@ use robust::{Coord3D, orient3d};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use crate::directions::{self, Direction, chart, closest_nside, dot, from_centre, mean, places, spacing};
+use crate::directions::{self, Direction, chart, dot, from_centre, mean, places, spacing};
+use crate::healpix::closest_nside;
 use crate::points::check_lengths;
 use crate::{Error, Healpix, Map, Percent, Regrid};
 

@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 // Version of this interface. A plugin works with a longan of the same version only.
-#define LONGAN_INTERFACE 2
+#define LONGAN_INTERFACE 3
 
 // Most bytes of a text, its final zero among them. Texts are UTF-8, on one line.
 #define LONGAN_TEXT_SIZE 1024
@@ -39,6 +39,36 @@
 // A measure of tensors that are weighted by curvature, W_2.
 #define LONGAN_WEIGHT_CURVATURE 2
 
+// An area on the sphere.
+#define LONGAN_QUANTITY_AREA 1
+
+// A length on the sphere.
+#define LONGAN_QUANTITY_LENGTH 2
+
+// A total curvature, which has a sign.
+#define LONGAN_QUANTITY_CURVATURE 3
+
+// A moment psi_s by magnitude, or an eigenvalue: a length, or of tensors weighted by curvature a curvature.
+#define LONGAN_QUANTITY_MOMENT 4
+
+// A number of things.
+#define LONGAN_QUANTITY_COUNT 5
+
+// A quotient of quantities of one kind.
+#define LONGAN_QUANTITY_RATIO 6
+
+// A direction in degrees, from south towards east, up to 360 degrees over the measure's `symmetry`.
+#define LONGAN_QUANTITY_ANGLE 7
+
+// A deviation from an expected value in standard deviations, about 0.
+#define LONGAN_QUANTITY_DEVIATION 8
+
+// A rank among other values, from 0 to 100.
+#define LONGAN_QUANTITY_PERCENTILE 9
+
+// Any other number.
+#define LONGAN_QUANTITY_NUMBER 10
+
 // A complex number.
 typedef struct LonganComplex {
   // Real part.
@@ -47,7 +77,7 @@ typedef struct LonganComplex {
   double im;
 } LonganComplex;
 
-// The moments of one window, the mean over the thresholds, made up for what is masked.
+// The moments of one window, the mean over the thresholds, divided by the share of it that is not masked.
 typedef struct LonganWindow {
   // Colatitude of the centre in degrees.
   double colatitude;
@@ -64,7 +94,7 @@ typedef struct LonganWindow {
   // psi_s for each of the measure's `ranks`, in their order: the sum of L exp(i s phi) over the contour's pieces,
   // phi the angle of their outward normal from south towards east. psi_0 is real.
   const struct LonganComplex *psi;
-  // The accuracy of psi_s, s from 1, as a share of the contour's weight: what differs by less is not told apart.
+  // The accuracy of psi_s, s from 1, as a share of the contour's weight: values that differ by less are not told apart.
   double resolution;
 } LonganWindow;
 
@@ -86,18 +116,24 @@ typedef struct LonganMeasure {
   uint32_t needs;
   // LONGAN_WEIGHT_...: the tensors that it is defined for.
   uint32_t weight;
+  // LONGAN_QUANTITY_...: the kind of quantity that it is; how values are drawn, averaged and compared follows from
+  // it, and so does whether windows with hardly any contour are left out (ratios and angles are).
+  uint32_t quantity;
+  // Of an angle the number of turns within 360 degrees that change nothing, from 1 to LONGAN_RANK_MAX; of other
+  // quantities 0.
+  uint32_t symmetry;
   // The ranks of the moments psi_s that it needs, ascending, 0 for psi_0; may be NULL for none.
   const uint32_t *ranks;
   // The number of `ranks`.
   uint32_t ranks_count;
   // The name on the command line: a lower-case letter, then lower-case letters, digits and hyphens, up to 60.
   const char *name;
-  // What it is, in one line, with its formula.
+  // The definition in one line, with the formula.
   const char *definition;
-  // Its unit, in ASCII: "sr", "rad", "deg", or "" for a pure number.
+  // The unit, in ASCII: "sr", "rad", "deg", or "" for a pure number; of an angle "deg".
   const char *unit;
   // Evaluates windows: `values` has room for one number for each, in the measure's unit, and NaN says that the
-  // measure is not defined there. What is infinite is taken as not defined.
+  // measure is not defined there. An infinite value is taken as not defined.
   //
   // Returns 0, or anything else for a failure, which ends the run. Then `message`, which has room for
   // LONGAN_TEXT_SIZE bytes and is empty at first, may hold a text for the user.
@@ -107,7 +143,7 @@ typedef struct LonganMeasure {
                       const struct LonganWindows *windows,
                       double *values,
                       char *message);
-  // Whatever the plugin wants to find here again; may be NULL.
+  // A pointer of the plugin's own, which longan hands back unread; may be NULL.
   const void *context;
 } LonganMeasure;
 

@@ -1,6 +1,6 @@
-//! All measures that a run can name: the built-ins, those of plugins, and formulas.
+//! All measures that a run can name: built-ins, measures of plugins, and formulas.
 //!
-//! A measure of a plugin has its own name, and with the plugin's, `plugin:measure`, where others have that name too.
+//! A plugin's measure is written by its own name, or as `plugin:measure` where others have that name too.
 
 use std::sync::Arc;
 
@@ -14,22 +14,22 @@ pub struct Catalogue {
     plugins: Vec<Plugin>,
 }
 
-/// Why a measure cannot be had.
+/// The reason why a text gives no measure.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CatalogueError {
-    /// No such name.
+    /// A name that no measure has.
     #[error(transparent)]
     Unknown(#[from] UnknownMeasure),
-    /// A formula that is none.
+    /// A formula with a fault.
     #[error(transparent)]
     Formula(#[from] FormulaError),
-    /// A name that several have.
+    /// A name that several measures have.
     #[error("'{name}' is the name of several measures; choose {}", names.join(" or "))]
     Ambiguous {
         /// The name.
         name: String,
-        /// What to write instead.
+        /// The names to write instead.
         names: Vec<String>,
     },
     /// A text that is neither name nor formula.
@@ -43,14 +43,14 @@ pub enum CatalogueError {
     Clash {
         /// The name.
         name: String,
-        /// The file of the one.
+        /// The file of one.
         first: String,
-        /// The file of the other.
+        /// The file of another.
         second: String,
     },
 }
 
-/// The built-ins as a name's first part, `longan:evq`.
+/// The first part of a built-in's whole name, `longan:evq`.
 const BUILT_IN: &str = "longan";
 
 impl Catalogue {
@@ -73,7 +73,7 @@ impl Catalogue {
         &self.plugins
     }
 
-    /// The name to be written for a plugin's measure: its own, or with the plugin's where that is ambiguous.
+    /// The name to be written for a plugin's measure: its own, or where that is ambiguous `plugin:measure`.
     pub fn name_of(&self, plugin: &Plugin, measure: &PluginMeasure) -> String {
         let name = measure.name();
         if self.named(&name).count() + usize::from(find(&name).is_ok()) > 1 {
@@ -134,7 +134,7 @@ impl Catalogue {
     }
 }
 
-/// The parts of a list, which commas separate; those within brackets do not.
+/// The parts of a list, separated by commas outside of brackets.
 pub fn split(list: &str) -> Vec<&str> {
     let mut parts = Vec::new();
     let (mut depth, mut start) = (0usize, 0);

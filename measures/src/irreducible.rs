@@ -2,13 +2,14 @@
 
 use num_complex::Complex64;
 
-use crate::Needs;
-use crate::registry::Kind;
+use crate::kind::Kind;
+use crate::{Needs, Quantity};
 
 /// Anisotropy of rank N.
 pub(crate) const PSI: Kind = Kind {
     pattern: "psiN",
     rank: None,
+    quantity: |_| Quantity::Moment,
     unit: "rad",
     definition: "irreducible anisotropy of rank N, |ψ_N|",
     needs: |n| Needs { ranks: vec![n], ..Needs::default() },
@@ -19,6 +20,7 @@ pub(crate) const PSI: Kind = Kind {
 pub(crate) const PSI_DIRECTION: Kind = Kind {
     pattern: "psiN-direction",
     rank: None,
+    quantity: |n| Quantity::Angle { symmetry: n },
     unit: "deg",
     definition: "irreducible direction of rank N, arg(ψ_N)/N, in (−180°/N, 180°/N], from south towards east",
     needs: |n| Needs { ranks: vec![n], ..Needs::default() },
@@ -29,6 +31,7 @@ pub(crate) const PSI_DIRECTION: Kind = Kind {
 pub(crate) const Q: Kind = Kind {
     pattern: "qN",
     rank: None,
+    quantity: |_| Quantity::Ratio,
     unit: "",
     definition: "normalised anisotropy of rank N, |ψ_N|/ψ_0",
     needs: |n| Needs { ranks: vec![0, n], ..Needs::default() },

@@ -1,17 +1,17 @@
 //! The measures that longan takes of a window.
 //!
-//! A [`Measure`] says which moments it [needs](Measure::needs) and turns one window's moments into a number; how the
-//! moments come about is the engine's affair. The built-ins stand in [`BUILT_INS`], one file an idea, with their
-//! formulas; [`find`] makes one from its name. A [`Formula`] is a measure written as a text, [`plugin`] loads measures
-//! from libraries, and a [`Catalogue`] knows them all by name. `ψ_s = Σ L e^{isϕ}` are the moments of Collischon et al. 2024,
-//! "Morphometry on the sphere", Commun. Phys. 7.
+//! A [`Measure`] says which moments it [needs](Measure::needs), turns one window's moments into a number, and states the
+//! [`Quantity`] of that number, from which its treatment follows; how the moments come about is the engine's affair. The
+//! built-ins stand in [`BUILT_INS`], one file an idea, with their formulas; [`find`] makes one from its name. A [`Formula`]
+//! is a measure written as a text, [`plugin`] loads measures from libraries, and a [`Catalogue`] knows them all by name.
+//! `ψ_s = Σ L e^{isϕ}` are the moments of Collischon et al. 2024, "Morphometry on the sphere", Commun. Phys. 7.
 //!
 //! ```
-//! use longan_measures::{Measure, Window, find};
+//! use longan_measures::{Measure, Quantity, Window, find};
 //! use num_complex::Complex64;
 //!
 //! let evq = find("evq")?;
-//! assert_eq!(evq.needs().ranks, [0, 2]);
+//! assert_eq!((evq.needs().ranks, evq.quantity()), (vec![0, 2], Quantity::Ratio));
 //! let window = Window { psi0: 3.0, ranks: &[2], psi: &[Complex64::new(0.0, 1.0)], ..Window::default() };
 //! assert_eq!(evq.evaluate(&window), Some(2.0));
 //! # Ok::<(), longan_measures::UnknownMeasure>(())
@@ -22,7 +22,9 @@ mod coverage;
 mod formula;
 mod functionals;
 mod irreducible;
+mod kind;
 pub mod plugin;
+mod quantity;
 mod rank2;
 mod rank4;
 mod registry;
@@ -32,19 +34,21 @@ use num_complex::Complex64;
 
 pub use catalogue::{Catalogue, CatalogueError, split};
 pub use formula::{Formula, FormulaError};
-pub use registry::{BUILT_INS, BuiltIn, Kind, UnknownMeasure, find, usual};
+pub use kind::Kind;
+pub use quantity::Quantity;
+pub use registry::{BUILT_INS, BuiltIn, UnknownMeasure, find, usual};
 
-/// What the contour's pieces weigh in the moments ψ_s.
+/// The weight of the contour's pieces in the moments ψ_s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
-    /// Their length: ψ_s of the tensors W_1^{0,s}.
+    /// The length of a piece: ψ_s of the tensors W_1^{0,s}.
     #[default]
     Length,
-    /// The exterior angles at its vertices: ψ_s = Σ ∫ e^{isϕ} dϕ of the curvature-weighted tensors W_2^{0,s}.
+    /// The exterior angles at the contour's vertices: ψ_s = Σ ∫ e^{isϕ} dϕ of the curvature-weighted tensors W_2^{0,s}.
     Curvature,
 }
 
-/// Which moments of a window a measure needs.
+/// The moments of a window that a measure needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
     /// W0, the body's area.
@@ -59,17 +63,17 @@ pub struct Needs {
     pub weight: Option<Weight>,
 }
 
-/// Why a measure could not be evaluated. That it is not defined for a window is no error.
+/// The failure of a measure. A window for which the measure is not defined is none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the measure '{measure}' failed: {reason}")]
 pub struct MeasureError {
     /// The measure's name.
     pub measure: String,
-    /// What it says about it.
+    /// The reason, in the measure's words.
     pub reason: String,
 }
 
-/// Where a measure comes from.
+/// The origin of a measure.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Origin {
     /// The program itself.
@@ -83,8 +87,8 @@ pub enum Origin {
 
 /// The moments of one window, the mean over the thresholds.
 ///
-/// Areas, lengths and ψ_s are those of the whole window: what is masked has been made up for, once, by division by
-/// 1 − `masked_fraction`, curvatures by their own share.
+/// Areas, lengths and ψ_s are those of the whole window: they have been divided, once, by 1 − `masked_fraction`, the share
+/// of its cells that is not masked, and curvatures by the share of its edges.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Window<'a> {
     /// Colatitude and longitude of the centre in degrees.
@@ -103,7 +107,7 @@ pub struct Window<'a> {
     pub ranks: &'a [u32],
     /// ψ_s of these ranks, in the frame of the centre: angles count from south towards east.
     pub psi: &'a [Complex64],
-    /// The accuracy of ψ_s, s ≥ 1, as a share of the contour's weight: what differs by less is not told apart.
+    /// The accuracy of ψ_s, s ≥ 1, as a share of the contour's weight: values that differ by less are not told apart.
     pub resolution: f64,
 }
 
@@ -125,13 +129,16 @@ pub trait Measure: Send + Sync {
     /// The name on the command line, such as `evq-direction`: lower case, digits and hyphens.
     fn name(&self) -> String;
 
-    /// What it is, in one line, with its formula.
+    /// The definition in one line, with the formula.
     fn definition(&self) -> String;
 
-    /// Its unit: `sr`, `rad`, `deg`, or empty for a pure number.
+    /// The kind of quantity: how values are drawn, averaged and compared follows from it.
+    fn quantity(&self) -> Quantity;
+
+    /// The unit: `sr`, `rad`, `deg`, or empty for a pure number. That of an [angle](Quantity::Angle) is `deg`.
     fn unit(&self) -> &str;
 
-    /// The rank of the tensor that it belongs to.
+    /// The rank of the tensor that the measure belongs to.
     fn rank(&self) -> u32;
 
     /// The moments that [`evaluate`](Self::evaluate) reads.
@@ -151,18 +158,24 @@ pub trait Measure: Send + Sync {
         Ok(())
     }
 
-    /// Whether it is a ratio or a direction, which a window with hardly any contour gives at random, and not a quantity
-    /// that adds up. By default what has no unit or degrees is, but for what needs no moments.
+    /// Whether a window with hardly any contour leaves the measure to chance, as it does ratios and angles, unlike
+    /// quantities that add up. Of numbers of no stated kind, those without unit or in degrees are taken as ratios. A
+    /// measure that needs no moments is never left to chance.
     fn is_relative(&self) -> bool {
-        matches!(self.unit(), "" | "deg") && self.needs() != Needs::default()
+        let is_ratio = match self.quantity() {
+            Quantity::Ratio | Quantity::Angle { .. } => true,
+            Quantity::Area | Quantity::Length | Quantity::Curvature | Quantity::Moment | Quantity::Count => false,
+            Quantity::Deviation | Quantity::Percentile | Quantity::Number => matches!(self.unit(), "" | "deg"),
+        };
+        is_ratio && self.needs() != Needs::default()
     }
 
-    /// The name of its column in a file: `EVQ_DIRECTION`.
+    /// The name of the measure's column in a file: `EVQ_DIRECTION`.
     fn column(&self) -> String {
         self.name().to_uppercase().replace(['-', ':'], "_")
     }
 
-    /// Where it comes from.
+    /// The origin of the measure.
     fn origin(&self) -> Origin {
         Origin::Program
     }

@@ -3,8 +3,8 @@
 //! Those of W_2 may be negative; their quotients are of their magnitudes, and exist only where both have one sign.
 
 use crate::irreducible::direction;
-use crate::registry::Kind;
-use crate::{Needs, Window};
+use crate::kind::Kind;
+use crate::{Needs, Quantity, Window};
 
 /// Twice the eigenvalues by magnitude, the larger first; the smaller is negative where they differ in sign.
 fn eigenvalues(window: &Window<'_>) -> [f64; 2] {
@@ -16,6 +16,7 @@ fn eigenvalues(window: &Window<'_>) -> [f64; 2] {
 pub(crate) const EVQ: Kind = Kind {
     pattern: "evq",
     rank: Some(2),
+    quantity: |_| Quantity::Ratio,
     unit: "",
     definition: "eigenvalue quotient of the rank 2 tensor, larger over smaller by magnitude, where both have one sign: \
                  (|ψ_0| + |ψ_2|)/(|ψ_0| − |ψ_2|)",
@@ -30,13 +31,14 @@ pub(crate) const EVQ: Kind = Kind {
 pub(crate) const BETA: Kind = Kind {
     pattern: "beta",
     rank: Some(2),
+    quantity: |_| Quantity::Ratio,
     unit: "",
     definition: "eigenvalue quotient of the rank 2 tensor, smaller over larger by magnitude, where both have one sign: \
                  (|ψ_0| − |ψ_2|)/(|ψ_0| + |ψ_2|), from 0, all one direction, to 1, none preferred",
     needs: |_| Needs { ranks: vec![0, 2], ..Needs::default() },
     evaluate: |_, w| {
         let [larger, smaller] = eigenvalues(w);
-        // What is not told apart from 0 is 0, or its rounding would be compared.
+        // A value that is not told apart from 0 is 0, or its rounding would be compared.
         let least = w.resolution * w.psi0.abs();
         (larger > 0.0 && smaller >= -least).then(|| if smaller > least { smaller / larger } else { 0.0 })
     },
@@ -46,6 +48,7 @@ pub(crate) const BETA: Kind = Kind {
 pub(crate) const EVQ_DIRECTION: Kind = Kind {
     pattern: "evq-direction",
     rank: Some(2),
+    quantity: |_| Quantity::Angle { symmetry: 2 },
     unit: "deg",
     definition: "direction of the algebraically larger eigenvalue's vector, arg(ψ_2)/2, in (−90°, 90°], from south \
                  towards east",
@@ -79,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_sum_does_not_resolve_is_no_quotient() {
+    fn values_that_the_sum_does_not_resolve_are_no_quotients() {
         let psi = [Complex64::new(1.0 - 1e-9, 0.0)];
         let window = |resolution| Window { psi0: 1.0, ranks: &[2], psi: &psi, resolution, ..Window::default() };
         assert_eq!(find("evq").unwrap().evaluate(&window(1e-7)), None);

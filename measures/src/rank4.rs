@@ -5,14 +5,15 @@
 
 use nalgebra::Matrix3;
 
-use crate::registry::Kind;
-use crate::{Needs, Window};
+use crate::kind::Kind;
+use crate::{Needs, Quantity, Window};
 
 macro_rules! kind {
     ($pattern:literal, $definition:literal, $evaluate:expr) => {
         Kind {
             pattern: $pattern,
             rank: Some(4),
+            quantity: |_| Quantity::Moment,
             unit: "rad",
             definition: $definition,
             needs: |_| Needs { ranks: vec![0, 2, 4], ..Needs::default() },

@@ -2,24 +2,8 @@
 //!
 //! Command line, `longan measures` and the documentation all read this list.
 
-use crate::{Measure, Needs, Window, coverage, functionals, irreducible, rank2, rank4};
-
-/// A built-in measure, or a family of them with a rank N in its name.
-#[derive(Debug)]
-pub struct Kind {
-    /// The name; `N` stands for any rank from 1.
-    pub pattern: &'static str,
-    /// The rank of the tensor; in a family, `None`.
-    pub rank: Option<u32>,
-    /// Unit, as [`Measure::unit`].
-    pub unit: &'static str,
-    /// Definition, as [`Measure::definition`], with `N` for the rank of a family.
-    pub definition: &'static str,
-    /// Moments needed, for a rank.
-    pub needs: fn(u32) -> Needs,
-    /// The measure, for a rank.
-    pub evaluate: fn(u32, &Window<'_>) -> Option<f64>,
-}
+use crate::kind::Kind;
+use crate::{Measure, Needs, Quantity, Window, coverage, functionals, irreducible, rank2, rank4};
 
 /// All built-in measures.
 pub const BUILT_INS: &[&Kind] = &[
@@ -55,6 +39,10 @@ impl Measure for BuiltIn {
 
     fn definition(&self) -> String {
         self.with_rank(self.kind.definition)
+    }
+
+    fn quantity(&self) -> Quantity {
+        (self.kind.quantity)(self.rank)
     }
 
     fn unit(&self) -> &str {
@@ -93,11 +81,11 @@ impl BuiltIn {
 
 /// A name that no measure has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no measure '{name}'{}; `longan measures` lists them all", nearest.as_ref().map(|n| format!(" (did you mean '{n}'?)")).unwrap_or_default())]
+#[error("there is no measure '{name}'{}", nearest.as_ref().map(|n| format!(" (did you mean '{n}'?)")).unwrap_or_default())]
 pub struct UnknownMeasure {
-    /// What was asked for.
+    /// The name asked for.
     pub name: String,
-    /// The name most like it, if one is.
+    /// The known name most like it, if any is like it.
     pub nearest: Option<String>,
 }
 
@@ -183,6 +171,35 @@ mod tests {
             assert!(["sr", "rad", "deg", ""].contains(&kind.unit), "{}", kind.pattern);
             assert_eq!(kind.rank.is_none(), kind.pattern.contains('N'), "{}", kind.pattern);
             assert!(BUILT_INS[..i].iter().all(|other| other.pattern != kind.pattern), "{} twice", kind.pattern);
+        }
+    }
+
+    #[test]
+    fn quantities_follow_from_the_measure() {
+        let angle = |symmetry| Quantity::Angle { symmetry };
+        for (name, quantity, is_relative) in [
+            ("w0", Quantity::Area, false),
+            ("w1", Quantity::Length, false),
+            ("w2", Quantity::Curvature, false),
+            ("trace", Quantity::Moment, false),
+            ("evq", Quantity::Ratio, true),
+            ("beta", Quantity::Ratio, true),
+            ("evq-direction", angle(2), true),
+            ("psi3", Quantity::Moment, false),
+            ("psi3-direction", angle(3), true),
+            ("psi12-direction", angle(12), true),
+            ("q4", Quantity::Ratio, true),
+            ("rank4-min", Quantity::Moment, false),
+            ("rank4-norm", Quantity::Moment, false),
+            // Known of every window, whatever contour it has.
+            ("masked-fraction", Quantity::Ratio, false),
+            ("contour-length", Quantity::Length, false),
+        ] {
+            let measure = find(name).unwrap();
+            assert_eq!((measure.quantity(), measure.is_relative()), (quantity, is_relative), "{name}");
+            // The rule before measures stated their quantity.
+            let by_unit = matches!(measure.unit(), "" | "deg") && measure.needs() != Needs::default();
+            assert_eq!(measure.is_relative(), by_unit, "{name}");
         }
     }
 

@@ -1,28 +1,34 @@
-//! What every measure must keep to: the built-ins are tested with it, and so can any other measure be.
+//! The contract of measures, as a check: the built-ins pass it, and so must any other measure.
 
 use num_complex::Complex64;
 
-use crate::{Measure, Window};
+use crate::{Measure, Quantity, Window};
 
-/// Stands in the windows for what a measure does not need.
+/// The value in windows of all that a measure does not need.
 const NOT_NEEDED: f64 = 7.5;
 
-/// Checks names, units and needs of a measure, and that it evaluates windows of every sort, by themselves, in company
-/// and many at a time, to the same.
+/// Checks names, units, the quantity and needs of a measure, and that it evaluates windows of every sort, by themselves, in
+/// company and many at a time, to the same.
 ///
 /// # Panics
-/// With a sentence that says what is wrong.
+/// With a sentence that names the fault.
 pub fn check(measure: &dyn Measure) {
     let name = measure.name();
     let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     assert!(!name.is_empty() && name.chars().all(allowed), "'{name}' is not lower case, digits and hyphens");
     assert!(measure.definition().lines().count() == 1, "{name}: the definition is not one line");
     assert!(measure.unit().is_ascii(), "{name}: the unit is not ASCII, as FITS wants it");
+    let quantity = measure.quantity();
+    assert_eq!(quantity, measure.quantity(), "{name} is not always the same quantity");
+    if let Quantity::Angle { symmetry } = quantity {
+        assert!(symmetry > 0, "{name}: an angle of the symmetry 0; a whole turn is the symmetry 1");
+        assert_eq!(measure.unit(), "deg", "{name}: angles are in 'deg'");
+    }
     let needs = measure.needs();
     assert!(needs.ranks.windows(2).all(|w| w[0] < w[1]), "{name}: the ranks needed do not ascend");
-    assert_eq!(needs, measure.needs(), "{name} does not always need the same");
+    assert_eq!(needs, measure.needs(), "{name} does not always need the same moments");
     let needed: Vec<u32> = needs.ranks.iter().copied().filter(|&s| s > 0).collect();
-    // What others in the same run may need.
+    // Ranks that other measures of the same run may need.
     let mut more: Vec<u32> = needed.iter().copied().chain(1..=5).collect();
     more.sort_unstable();
     more.dedup();
@@ -60,6 +66,10 @@ pub fn check(measure: &dyn Measure) {
         let value = measure.evaluate(window);
         if let Some(value) = value {
             assert!(value.is_finite(), "{name} is {value} for {window:?}; undefined should be None");
+            if let Quantity::Angle { symmetry } = quantity {
+                let turn = 360.0 / f64::from(symmetry);
+                assert!(value.abs() <= turn, "{name} is {value}, more than the {turn} degrees of a turn");
+            }
         }
         values.push(value.unwrap_or(f64::NAN).to_bits());
     }

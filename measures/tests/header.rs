@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cbindgen::{Builder, Config, DocumentationStyle, Language, Style};
 
-/// What stands before and after the definitions.
+/// The texts before and after the definitions.
 const HEAD: &str = "\
 /* The interface between longan and its plugins. Made from measures/src/plugin/interface.rs: do not edit it here.
  *

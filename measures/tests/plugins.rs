@@ -4,8 +4,9 @@ use longan_support::compile;
 
 use std::path::{Path, PathBuf};
 
-use longan_measures::plugin::{Plugin, in_folders};
-use longan_measures::{Catalogue, Measure, MeasureError, Needs, Origin, Weight, Window, find, testing};
+use longan_measures::plugin::interface::*;
+use longan_measures::plugin::{Plugin, PluginErrorKind, in_folders};
+use longan_measures::{Catalogue, Measure, MeasureError, Needs, Origin, Quantity, Weight, Window, find, testing};
 use num_complex::Complex64;
 use tempfile::TempDir;
 
@@ -29,11 +30,14 @@ impl Libraries {
     }
 
     #[track_caller]
-    fn refused(&self, path: &Path, parts: &[&str]) {
-        let sentence = Plugin::load(path).map(|plugin| panic!("{plugin:?}")).unwrap_err().to_string();
+    fn refused(&self, path: &Path, parts: &[&str]) -> PluginErrorKind {
+        let error = Plugin::load(path).map(|plugin| panic!("{plugin:?}")).unwrap_err();
+        assert_eq!(error.path(), path);
+        let sentence = error.to_string();
         assert!(sentence.starts_with(&path.display().to_string()), "{sentence}");
         assert!(!sentence.contains('\n') && !sentence.ends_with('.'), "{sentence}");
         assert!(parts.iter().all(|part| sentence.contains(part)), "no {parts:?} in: {sentence}");
+        error.kind()
     }
 }
 
@@ -147,8 +151,6 @@ fn broken_plugins_are_refused_in_one_sentence() {
     let cases: &[(&[&str], &[&str])] = &[
         (&["HANDSHAKE=other"], &["no plugin of longan", "'longan_plugin_handshake'"]),
         (&["DESCRIBE=other"], &["no plugin of longan", "'longan_plugin'"]),
-        (&["INTERFACE=1"], &["version 1 of the plugin interface", "longan has version 2", "build it anew"]),
-        (&["INTERFACE=0"], &["version 0"]),
         (&["DESCRIPTION=NULL"], &["cannot start: it does not say why"]),
         (&["DESCRIPTION=NULL", r#"REFUSAL="no licence found.""#], &["cannot start: no licence found"]),
         (&["DESCRIPTION=NULL", r#"REFUSAL="\xc3\x28""#], &["its message is not UTF-8"]),
@@ -193,9 +195,54 @@ fn broken_plugins_are_refused_in_one_sentence() {
         (&["RANK=4000000000u"], &["the rank 4000000000"]),
         (&["NEEDS=8"], &["needs 0x8"]),
         (&["WEIGHT=3"], &["weight 3"]),
+        (&["QUANTITY=0"], &["measure 'all' does not state its quantity"]),
+        (&["QUANTITY=11"], &["measure 'all' has the quantity 11", "between 1 and 10"]),
+        (&["SYMMETRY=2"], &["'all' has the symmetry 2", "only an angle"]),
+        (&["QUANTITY=7", "UNIT=\"deg\""], &["'all' is an angle of the symmetry 0", "between 1 and 1000"]),
+        (&["QUANTITY=7", "UNIT=\"deg\"", "SYMMETRY=1001"], &["angle of the symmetry 1001"]),
+        (&["QUANTITY=7", "SYMMETRY=2"], &["'all' is an angle in 'rad'", "in 'deg'"]),
     ];
     for (i, (defined, parts)) in cases.iter().enumerate() {
         libraries.refused(&libraries.library(&format!("broken{i}"), defined), parts);
+    }
+}
+
+#[test]
+fn plugins_of_other_versions_are_to_be_built_anew() {
+    let libraries = Libraries::new();
+    for version in [0, 1, 2, LONGAN_INTERFACE + 1] {
+        let plugin = libraries.library(&format!("version{version}"), &[&format!("INTERFACE={version}")]);
+        let found = format!("version {version} of the plugin interface");
+        let here = format!("longan has version {LONGAN_INTERFACE}");
+        let kind =
+            libraries.refused(&plugin, &[&found, &here, "build it anew with the header or crate of this longan"]);
+        assert_eq!(kind, PluginErrorKind::Outdated);
+    }
+}
+
+#[test]
+fn plugins_state_their_quantities() {
+    let libraries = Libraries::new();
+    let quantities = [
+        (LONGAN_QUANTITY_AREA, Quantity::Area),
+        (LONGAN_QUANTITY_LENGTH, Quantity::Length),
+        (LONGAN_QUANTITY_CURVATURE, Quantity::Curvature),
+        (LONGAN_QUANTITY_MOMENT, Quantity::Moment),
+        (LONGAN_QUANTITY_COUNT, Quantity::Count),
+        (LONGAN_QUANTITY_RATIO, Quantity::Ratio),
+        (LONGAN_QUANTITY_ANGLE, Quantity::Angle { symmetry: 3 }),
+        (LONGAN_QUANTITY_DEVIATION, Quantity::Deviation),
+        (LONGAN_QUANTITY_PERCENTILE, Quantity::Percentile),
+        (LONGAN_QUANTITY_NUMBER, Quantity::Number),
+    ];
+    for (number, quantity) in quantities {
+        let stated = [format!("QUANTITY={number}"), format!("SYMMETRY={}", quantity.symmetry().unwrap_or(0))];
+        let mut defined: Vec<&str> = stated.iter().map(String::as_str).collect();
+        defined.extend(quantity.symmetry().map(|_| "UNIT=\"deg\""));
+        let plugin = libraries.plugin(&format!("quantity{number}"), &defined);
+        assert_eq!(plugin.measures()[0].quantity(), quantity);
+        let is_relative = matches!(quantity, Quantity::Ratio | Quantity::Angle { .. });
+        assert_eq!(plugin.measures()[0].is_relative(), is_relative, "{quantity}");
     }
 }
 
@@ -211,7 +258,8 @@ fn files_that_are_no_libraries_are_refused() {
     libraries.refused(&file("empty.so", b""), &["not a library"]);
     libraries.refused(&file("text.so", b"no library at all, but a text\n"), &["not a library"]);
     libraries.refused(&file("cut.so", &whole[..200]), &["not a library"]);
-    libraries.refused(&libraries.0.path().join("missing.so"), &["no such file"]);
+    let kind = libraries.refused(&libraries.0.path().join("missing.so"), &["no such file"]);
+    assert_eq!(kind, PluginErrorKind::Unreadable);
     libraries.refused(libraries.0.path(), &["not a file"]);
     // A name alone is not looked for among the system's libraries.
     libraries.refused(Path::new("libm.so.6"), &["no such file"]);
@@ -256,7 +304,7 @@ fn folders_are_searched_but_never_the_working_one() {
     assert!(error.contains("/no/such/folder") && error.contains("LONGAN_PLUGIN_PATH"), "{error}");
 }
 
-/// Whatever is dropped first: the library goes with the last that needs it.
+/// The library goes with the last object that needs it, in whichever order they are dropped.
 #[cfg(unix)]
 #[test]
 fn a_library_is_unloaded_last() {

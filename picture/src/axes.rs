@@ -9,9 +9,9 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Error;
 use super::canvas::{Area, FONT, UNITS, failed};
+use super::limits::LIMIT;
 pub use super::pen::Frame;
 use super::pen::INK;
-use super::scale::LIMIT;
 use super::ticks::{Ticks, superscript};
 
 /// Colours that people with any colour vision tell apart on white (Okabe & Ito 2008, without their yellow, which is too light).

@@ -27,12 +27,12 @@ const ASPECT: f64 = 0.8;
 /// Radii of the star's points and of the corners between them, in units of the letters' size.
 const STAR: (f64, f64) = (0.62, 0.27);
 
-/// A quantity.
+/// The name and the unit of an axis.
 #[derive(Clone, Debug, Default)]
-pub struct Quantity {
-    /// What it is.
+pub struct AxisLabel {
+    /// The name.
     pub name: String,
-    /// In which unit; may be empty.
+    /// The unit; may be empty.
     pub unit: String,
 }
 
@@ -40,9 +40,9 @@ pub struct Quantity {
 #[derive(Clone, Debug, Default)]
 pub struct Cloud {
     /// The quantity to the right.
-    pub x: Quantity,
+    pub x: AxisLabel,
     /// The quantity upwards.
-    pub y: Quantity,
+    pub y: AxisLabel,
     /// The points.
     pub points: Vec<(f64, f64)>,
     /// The star.
@@ -128,10 +128,10 @@ mod tests {
 
     #[test]
     fn a_point_each_and_a_star() {
-        let quantity = |name: &str, unit: &str| Quantity { name: name.into(), unit: unit.into() };
+        let label = |name: &str, unit: &str| AxisLabel { name: name.into(), unit: unit.into() };
         let cloud = Cloud {
-            x: quantity("EVQ", ""),
-            y: quantity("RANK4_MID", "rad"),
+            x: label("EVQ", ""),
+            y: label("RANK4_MID", "rad"),
             points: vec![(1.0, 2.0), (2.0, 1.0), (f64::NAN, 1.0), (1.5, f64::INFINITY)],
             star: (3.0, 3.0),
             legend: ["2 simulations".into(), "sky <&>".into()],

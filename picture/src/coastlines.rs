@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::projection::vector;
+use super::projection::vector_of_degrees;
 
 static LINES: &[u8] = include_bytes!("coastlines/coastlines.bin");
 
@@ -17,7 +17,7 @@ pub(super) fn coastlines() -> impl Iterator<Item = Vec<DVec3>> {
 }
 
 fn point((longitude, latitude): (f64, f64)) -> DVec3 {
-    vector((90.0 - latitude).to_radians(), longitude.to_radians())
+    vector_of_degrees(longitude, latitude)
 }
 
 #[cfg(test)]

@@ -76,7 +76,10 @@ impl FromStr for Colours {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let found = Colours::ALL.iter().find(|(_, name)| name.eq_ignore_ascii_case(text));
-        found.map(|(colours, _)| *colours).ok_or_else(|| super::Error::Colours { name: text.to_owned() })
+        found.map(|(colours, _)| *colours).ok_or_else(|| super::Error::Colours {
+            name: text.to_owned(),
+            known: Colours::ALL.map(|(_, name)| name).to_vec(),
+        })
     }
 }
 

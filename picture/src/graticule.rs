@@ -6,11 +6,11 @@ use glam::DVec3;
 use plotters::style::{Color, RGBColor};
 
 use super::Error;
-use super::panel::Place;
 use super::pen::{Anchor, At, Frame, Pen, Words, width};
-use super::projection::{Cut, vector};
+use super::projection::{Cut, vector_of_degrees};
 use super::ticks::signed;
 use super::view::{Orientation, View};
+use super::viewport::Viewport;
 
 /// Distances of parallels and of meridians, in degrees, on a picture of the whole sphere.
 const PARALLELS: f64 = 30.0;
@@ -55,7 +55,7 @@ pub(super) struct Graticule {
 impl Graticule {
     pub(super) fn new(view: &View) -> Self {
         let (longitude, latitude) = view.centre();
-        let at = |lon: f64, lat: f64| vector((90.0 - lat).to_radians(), lon.to_radians());
+        let at = vector_of_degrees;
         let is_part = view.projection().cut() == Cut::Limb && view.projection().is_rectangle();
         let mut graticule =
             Graticule { lines: Vec::new(), is_rectangle: view.projection().is_rectangle(), is_tilted: latitude != 0.0 };
@@ -123,7 +123,7 @@ impl Graticule {
         (widest + 2.0 * GAP * size, 1.4 * size)
     }
 
-    pub(super) fn draw_lines(&self, pen: &Pen<'_, '_>, place: &Place<'_>, size: f64) -> Result<(), Error> {
+    pub(super) fn draw_lines(&self, pen: &Pen<'_, '_>, place: &Viewport<'_>, size: f64) -> Result<(), Error> {
         // Half way between black and white, so that it shows on dark colours and on light ones.
         let colour = RGBColor(128, 128, 128).mix(0.75);
         let seen = self.lines.iter().flat_map(|line| &line.seen);
@@ -134,7 +134,7 @@ impl Graticule {
     pub(super) fn draw_names(
         &self,
         pen: &Pen<'_, '_>,
-        place: &Place<'_>,
+        place: &Viewport<'_>,
         size: f64,
         sheet: &Frame,
         taken: &mut Vec<Frame>,
@@ -178,7 +178,7 @@ impl Graticule {
 
 /// Where a line that ends at the rectangle's edge may be named: parallels at the left, meridians below, or else the
 /// other way around.
-fn beside_frame(line: &Line, place: &Place<'_>, size: f64) -> Vec<Words> {
+fn beside_frame(line: &Line, place: &Viewport<'_>, size: f64) -> Vec<Words> {
     let (a, b) = place.view.projection().half_extent();
     let near = |x: f64, edge: f64| (x - edge).abs() < 1e-6 * a;
     // The ends of the line with its directions there.
@@ -203,7 +203,7 @@ fn beside_frame(line: &Line, place: &Place<'_>, size: f64) -> Vec<Words> {
 }
 
 /// Where a parallel that ends at the outline may be named: left of its leftmost end.
-fn beside_disc(line: &Line, place: &Place<'_>, size: f64) -> Vec<Words> {
+fn beside_disc(line: &Line, place: &Viewport<'_>, size: f64) -> Vec<Words> {
     if line.is_meridian {
         return Vec::new();
     }

@@ -11,9 +11,9 @@ use plotters::style::{Color, WHITE};
 
 use super::Error;
 use super::coastlines::coastlines;
-use super::panel::Place;
 use super::pen::{Anchor, Frame, INK, Pen, Words};
-use super::projection::vector;
+use super::projection::{vector, vector_of_degrees};
+use super::viewport::Viewport;
 
 /// Points of a circle.
 const POINTS: u32 = 720;
@@ -98,7 +98,7 @@ impl Overlays {
     }
 
     /// Draws all but the names of marked points. `size` is that of texts.
-    pub(super) fn draw(&self, pen: &Pen<'_, '_>, place: &Place<'_>, size: f64) -> Result<(), Error> {
+    pub(super) fn draw(&self, pen: &Pen<'_, '_>, place: &Viewport<'_>, size: f64) -> Result<(), Error> {
         if self.coastlines {
             let lines: Vec<_> = coastlines().flat_map(|line| seen(place, line)).collect();
             on_any_colour(pen, &lines, size / 22.0)?;
@@ -123,7 +123,7 @@ impl Overlays {
     pub(super) fn draw_names(
         &self,
         pen: &Pen<'_, '_>,
-        place: &Place<'_>,
+        place: &Viewport<'_>,
         size: f64,
         sheet: &Frame,
     ) -> Result<Vec<Frame>, Error> {
@@ -164,7 +164,7 @@ impl Overlays {
 }
 
 /// What is seen of a line, in pixels, without points that cannot be told apart.
-fn seen(place: &Place<'_>, points: impl IntoIterator<Item = DVec3>) -> Vec<Vec<(f64, f64)>> {
+fn seen(place: &Viewport<'_>, points: impl IntoIterator<Item = DVec3>) -> Vec<Vec<(f64, f64)>> {
     let lines = place.view.line(points).into_iter().map(|line| place.all(&line));
     lines.map(thinned).collect()
 }
@@ -196,7 +196,7 @@ fn on_any_colour(pen: &Pen<'_, '_>, lines: &[Vec<(f64, f64)>], width: f64) -> Re
 impl Circle {
     /// Points around it, the last being the first.
     fn points(&self) -> impl Iterator<Item = DVec3> + use<> {
-        let middle = unit(self.centre);
+        let middle = vector_of_degrees(self.centre.0, self.centre.1);
         let one = middle.any_orthonormal_vector();
         let other = middle.cross(one);
         let (sin, cos) = self.radius.to_radians().sin_cos();
@@ -209,17 +209,13 @@ impl Circle {
 
 impl Mark {
     fn place(&self) -> DVec3 {
-        unit(self.at)
+        vector_of_degrees(self.at.0, self.at.1)
     }
-}
-
-fn unit((longitude, latitude): (f64, f64)) -> DVec3 {
-    vector((90.0 - latitude).to_radians(), longitude.to_radians())
 }
 
 impl Rods {
     /// Rods about the pixels of the finest grid, up to the map's own, on which they have room, each a line in pixels.
-    fn seen(&self, place: &Place<'_>) -> Vec<Vec<(f64, f64)>> {
+    fn seen(&self, place: &Viewport<'_>) -> Vec<Vec<(f64, f64)>> {
         let Some(grid) = Healpix::with_pixels(self.directions.len()) else { return Vec::new() };
         // Nside for which pixels are that far apart in the picture's middle.
         let nside = grid.pixel_side() * grid.nside() as f64 * place.scale() / (ROD_SPACING * place.width());
@@ -261,7 +257,8 @@ mod tests {
             for radius in [0.01, 6.0, 90.0, 150.0] {
                 let points: Vec<_> = Circle { centre, radius }.points().collect();
                 assert_eq!(points[0], points[POINTS as usize]);
-                let off = |at: &DVec3| (at.angle_between(unit(centre)).to_degrees() - radius).abs();
+                let off =
+                    |at: &DVec3| (at.angle_between(vector_of_degrees(centre.0, centre.1)).to_degrees() - radius).abs();
                 assert!(points.iter().all(|at| off(at) < 1e-6), "{centre:?} {radius}");
             }
         }

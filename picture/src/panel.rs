@@ -1,6 +1,5 @@
 //! One map with all that belongs to it: where its parts lie, and the order in which they are drawn.
 
-use glam::DVec3;
 use longan_grid::Healpix;
 
 use super::canvas::{Area, Placed};
@@ -9,7 +8,7 @@ use super::graticule::Graticule;
 use super::pen::{Anchor, At, Frame, INK, LINE, Pen, Words, fitted};
 use super::raster::{self, Field};
 use super::scale::Scale;
-use super::view::View;
+use super::viewport::Viewport;
 use super::{Error, Image, Options, WIDTHS};
 
 /// The size of texts as a share of the width, of the title at its largest, and of both at their smallest. A picture
@@ -21,61 +20,6 @@ const SMALLEST: f64 = 1.0 / 44.0;
 /// Lines of a title, and of the text below the colour bar, at most.
 const TITLE_LINES: usize = 3;
 const LABEL_LINES: usize = 2;
-
-/// Where the projection's plane lies in the picture.
-pub(super) struct Place<'a> {
-    pub(super) view: &'a View,
-    frame: Frame,
-    /// Width of the panel.
-    panel: f64,
-}
-
-impl Place<'_> {
-    /// Width and height of the map in pixels.
-    pub(super) fn pixels(&self) -> (usize, usize) {
-        (self.frame.width as usize, self.frame.height as usize)
-    }
-
-    /// Width of the panel.
-    pub(super) fn width(&self) -> f64 {
-        self.panel
-    }
-
-    /// Pixels of a unit of the plane, which in the middle is a radian.
-    pub(super) fn scale(&self) -> f64 {
-        self.frame.width / (2.0 * self.view.projection().half_extent().0)
-    }
-
-    /// Colatitude and longitude at a place on the map, counted from its corner.
-    pub(super) fn sphere(&self, x: f64, y: f64) -> Option<(f64, f64)> {
-        let (a, b) = self.view.projection().half_extent();
-        self.view.sphere((x / self.frame.width * 2.0 - 1.0) * a, (1.0 - y / self.frame.height * 2.0) * b)
-    }
-
-    /// Whether a place in the panel is on the map.
-    pub(super) fn covers(&self, (x, y): At) -> bool {
-        self.sphere(x - self.frame.left, y - self.frame.top).is_some()
-    }
-
-    /// Where a point of the plane is.
-    pub(super) fn of_plane(&self, (u, v): (f64, f64)) -> At {
-        let (a, b) = self.view.projection().half_extent();
-        (
-            self.frame.left + (u / a + 1.0) / 2.0 * self.frame.width,
-            self.frame.top + (1.0 - v / b) / 2.0 * self.frame.height,
-        )
-    }
-
-    /// Where points of the plane are.
-    pub(super) fn all(&self, points: &[(f64, f64)]) -> Vec<At> {
-        points.iter().map(|&point| self.of_plane(point)).collect()
-    }
-
-    /// Where a point of the sphere is seen, if it is.
-    pub(super) fn pixel(&self, at: DVec3) -> Option<At> {
-        Some(self.of_plane(self.view.plane(at)?))
-    }
-}
 
 /// A panel of which the images are made and the lines are not.
 pub(super) struct Prepared<'a> {
@@ -122,7 +66,7 @@ impl<'a> Prepared<'a> {
         };
         let bar = ColourBar::new(map.bottom() + below + 1.0 * text, width, text, label);
         let height = (bar.bottom() + 0.5 * margin).ceil() as usize;
-        let place = Place { view: &options.view, frame: map, panel: width };
+        let place = Viewport { view: &options.view, frame: map, panel: width };
         let field = Field { grid, values };
         let scale = Scale::new(&raster::seen(field, &place), &options.colouring)?;
         let images = [raster::coloured(field, &place, &scale), bar.image(&scale)];
@@ -131,8 +75,8 @@ impl<'a> Prepared<'a> {
     }
 
     /// Where the map lies.
-    pub(super) fn place(&self) -> Place<'_> {
-        Place { view: &self.options.view, frame: self.map, panel: self.size.0 as f64 }
+    pub(super) fn place(&self) -> Viewport<'_> {
+        Viewport { view: &self.options.view, frame: self.map, panel: self.size.0 as f64 }
     }
 
     /// Which colours values have.

@@ -8,9 +8,9 @@ use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 use std::fmt::Debug;
 
 use glam::DVec3;
+use longan_grid::directions;
 
-/// Sizes of [`Gnomonic`], in degrees: beyond them its corners are stretched past use, or rounding shows.
-pub const GNOMONIC_SIZES: std::ops::RangeInclusive<f64> = 0.01..=120.0;
+pub use super::limits::GNOMONIC_SIZES;
 
 /// A map of the sphere, or of a part of it, onto a region of the plane.
 pub trait Projection: Debug + Send + Sync {
@@ -55,10 +55,14 @@ fn rectangle((a, b): (f64, f64)) -> Vec<(f64, f64)> {
     vec![(-a, -b), (a, -b), (a, b), (-a, b)]
 }
 
-/// The unit vector of a point.
+/// The unit vector to a colatitude and longitude in radians.
 pub(super) fn vector(theta: f64, phi: f64) -> DVec3 {
-    let ((sin, cos), (sin_phi, cos_phi)) = (theta.sin_cos(), phi.sin_cos());
-    DVec3::new(sin * cos_phi, sin * sin_phi, cos)
+    DVec3::from_array(directions::at_colatitude(theta, phi))
+}
+
+/// The unit vector to a longitude and latitude in degrees.
+pub(super) fn vector_of_degrees(longitude: f64, latitude: f64) -> DVec3 {
+    vector((90.0 - latitude).to_radians(), longitude.to_radians())
 }
 
 /// Colatitude and longitude of a vector.

@@ -2,14 +2,12 @@
 //!
 //! Only what is seen of a map is looked at, so a map of any size is drawn in the time that its picture takes.
 
-use std::f64::consts::FRAC_PI_3;
-
 use longan_grid::Healpix;
 use rayon::prelude::*;
 
 use super::Image;
-use super::panel::Place;
 use super::scale::Scale;
+use super::viewport::Viewport;
 
 /// A pixel of the image in which several of the map's meet, or its edge, is the mean of this many times as many samples,
 /// along and across; where the map's pixels are the smaller ones, fewer do.
@@ -33,7 +31,7 @@ pub(super) struct Field<'a> {
 const PAPER: [u8; 3] = [255; 3];
 
 /// Values that are seen, evenly over the picture.
-pub(super) fn seen(field: Field<'_>, place: &Place<'_>) -> Vec<f64> {
+pub(super) fn seen(field: Field<'_>, place: &Viewport<'_>) -> Vec<f64> {
     let (width, height) = place.pixels();
     let step = (width * height).div_ceil(SEEN).isqrt().max(1);
     let rows: Vec<usize> = (0..height).step_by(step).collect();
@@ -44,12 +42,12 @@ pub(super) fn seen(field: Field<'_>, place: &Place<'_>) -> Vec<f64> {
 }
 
 /// The map in colours; white outside.
-pub(super) fn coloured(field: Field<'_>, place: &Place<'_>, scale: &Scale) -> Image {
+pub(super) fn coloured(field: Field<'_>, place: &Viewport<'_>, scale: &Scale) -> Image {
     let (width, height) = place.pixels();
     let mut image = Image::new(width, height);
     let pixel_at = |x: f64, y: f64| place.sphere(x, y).map(|(theta, phi)| field.grid.pixel_at(theta, phi));
     let colour = |pixel: Option<usize>| pixel.map_or(PAPER, |pixel| scale.colour(field.values[pixel]));
-    let is_fine = FRAC_PI_3.sqrt() / (field.grid.nside() as f64) * place.scale() < 1.0;
+    let is_fine = field.grid.pixel_side() * place.scale() < 1.0;
     let samples = if is_fine { FINE_SUPERSAMPLING } else { SUPERSAMPLING };
     let steps: Vec<f64> = (0..samples).map(|i| (i as f64 + 0.5) / samples as f64).collect();
     let samples = (samples * samples) as u16;

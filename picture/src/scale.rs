@@ -1,4 +1,4 @@
-//! Which colour a value has: the range, by what is seen and what it means, and the colours along it.
+//! The colour of a value: the range, by the values seen and their meaning, and the colours along it.
 //!
 //! The colour maps themselves are left to [`colours`](super::colours), what the colour bar names to
 //! [`ticks`](super::ticks).
@@ -7,6 +7,7 @@ use longan_grid::{UNSEEN, is_bad};
 
 use super::Error;
 use super::colours::Colours;
+use super::limits::LIMIT;
 
 /// Share of the values below and above the default colour range, each.
 const TAIL: f64 = 0.01;
@@ -14,9 +15,6 @@ const TAIL: f64 = 0.01;
 /// The default range ends at most this many times the distance of the quartiles beyond them, though more than [`TAIL`]
 /// of the values lie there: a normal distribution ends at 1.2 times.
 const FENCE: f64 = 10.0;
-
-/// Largest magnitude of a colour range's ends, for which no sum or power of ten overflows.
-pub(super) const LIMIT: f64 = 1e300;
 
 /// The colour of masked pixels.
 pub(super) const MASKED: [u8; 3] = [178, 178, 178];
@@ -28,7 +26,7 @@ const SIGNED: f64 = 0.2;
 /// Colours along the range.
 const STEPS: usize = 1024;
 
-/// What the values of a map are, as far as it decides how they are drawn.
+/// The meaning of a map's values, as far as it decides how they are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Meaning {
     /// Any numbers.
@@ -45,38 +43,16 @@ pub enum Meaning {
     },
 }
 
-impl Meaning {
-    /// What the values of a column of Minkowski maps are, by its name.
-    pub fn of(name: &str) -> Self {
-        let name = name.to_ascii_uppercase().replace('-', "_");
-        if name.ends_with("_SIGMA") {
-            return Meaning::Deviation;
-        }
-        if name.ends_with("_PERCENTILE") {
-            return Meaning::Percentile;
-        }
-        let Some((of, rest)) = name.split_once("_DIRECTION") else { return Meaning::Any };
-        if !(rest.is_empty() || rest.starts_with('_')) {
-            return Meaning::Any;
-        }
-        match of.strip_prefix("PSI").map(str::parse) {
-            Some(Ok(symmetry)) if symmetry > 0 => Meaning::Direction { symmetry },
-            None if of == "EVQ" => Meaning::Direction { symmetry: 2 },
-            _ => Meaning::Any,
-        }
-    }
-}
-
 /// How values become colours, as far as that is asked for.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Colouring {
-    /// The values at the ends of the colour bar; by default robust percentiles of what is seen.
+    /// The values at the ends of the colour bar; by default robust percentiles of the values seen.
     pub range: (Option<f64>, Option<f64>),
     /// Whether colours follow the logarithm.
     pub log: bool,
-    /// The colour map; by default one for what the values are.
+    /// The colour map; by default one that suits the meaning.
     pub colours: Option<Colours>,
-    /// What they are.
+    /// The meaning of the values.
     pub meaning: Meaning,
 }
 
@@ -281,21 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn what_values_mean_is_told_by_the_column() {
-        for (name, meaning) in [
-            ("EVQ", Meaning::Any),
-            ("EVQ_SIGMA", Meaning::Deviation),
-            ("evq_local_percentile", Meaning::Percentile),
-            ("EVQ_DIRECTION", Meaning::Direction { symmetry: 2 }),
-            ("psi4-direction", Meaning::Direction { symmetry: 4 }),
-            ("PSI12_DIRECTION_WINDOW_4", Meaning::Direction { symmetry: 12 }),
-            ("PSI2_DIRECTION_SIGMA", Meaning::Deviation),
-            ("PSI0_DIRECTION", Meaning::Any),
-            ("WIND_DIRECTION", Meaning::Any),
-            ("EVQ_DIRECTIONAL", Meaning::Any),
-        ] {
-            assert_eq!(Meaning::of(name), meaning, "{name}");
-        }
+    fn percentiles_and_directions_have_ranges_of_their_own() {
         let of = |meaning| scale(&[3.0], Colouring { meaning, ..Colouring::default() });
         let percentile = of(Meaning::Percentile);
         assert_eq!((percentile.low, percentile.high), (0.0, 100.0));

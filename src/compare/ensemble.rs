@@ -3,17 +3,21 @@
 //! Local percentiles count the simulations below the data at the same pixel, global ones the pixels of all simulations
 //! below it: exact whole numbers, of which an equal value counts one half. NaN is a masked pixel, and left out.
 
+use std::borrow::Cow;
+
+use ndarray::Array1;
 use rayon::prelude::*;
 
-use super::Error;
+use super::ComparisonError;
+use crate::quantile::percent;
 
-/// What is left of a sum of squares without one of its terms is rounding, and so no scatter, below this share of it.
+/// Below this share of a sum of squares, the rest of it without one of its terms is rounding, and so no scatter.
 const ROUNDING: f64 = 1e-12;
 
 /// Largest deviations this close to each other, as a share, are equal: they are computed in different ways.
 const EQUAL: f64 = 1e-9;
 
-/// What simulations have at one pixel.
+/// The simulated values at one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Place {
     /// Simulations that are not masked here.
@@ -30,8 +34,8 @@ struct Place {
 
 /// Data and the simulations seen so far.
 #[derive(Clone, Debug)]
-pub struct Ensemble {
-    data: Vec<f64>,
+pub(super) struct Ensemble<'a> {
+    data: Cow<'a, [f64]>,
     places: Vec<Place>,
     /// The data's values, ascending, each once.
     levels: Vec<f64>,
@@ -39,21 +43,21 @@ pub struct Ensemble {
     histogram: Vec<u64>,
 }
 
-/// How data lies among simulations: for each pixel in RING order, NaN where undefined.
+/// The deviation of data from simulations: one value for each pixel in RING order, NaN where undefined.
 #[derive(Clone, Debug)]
 pub struct Deviation {
     /// Mean of the simulations.
-    pub mean: Vec<f64>,
+    pub mean: Array1<f64>,
     /// Their standard deviation, with n − 1 in the denominator; of at least two.
-    pub std: Vec<f64>,
+    pub std: Array1<f64>,
     /// The data less the mean, in standard deviations; undefined where these are 0.
-    pub sigma: Vec<f64>,
+    pub sigma: Array1<f64>,
     /// The share of simulations with a lower value at this pixel, from 0 to 100.
-    pub local_percentile: Vec<f64>,
+    pub local_percentile: Array1<f64>,
     /// The share of all simulated pixels with a lower value, from 0 to 100.
-    pub global_percentile: Vec<f64>,
+    pub global_percentile: Array1<f64>,
     /// The number of simulations behind each pixel, masked ones left out.
-    pub count: Vec<f64>,
+    pub count: Array1<f64>,
 }
 
 impl Place {
@@ -91,9 +95,10 @@ impl Place {
     }
 }
 
-impl Ensemble {
+impl<'a> Ensemble<'a> {
     /// Data without simulations yet: values in RING order, NaN where masked.
-    pub fn new(data: Vec<f64>) -> Self {
+    pub(super) fn new(data: impl Into<Cow<'a, [f64]>>) -> Self {
+        let data = data.into();
         let mut levels: Vec<f64> = data.iter().copied().filter(|v| !v.is_nan()).collect();
         levels.par_sort_unstable_by(f64::total_cmp);
         levels.dedup();
@@ -104,10 +109,10 @@ impl Ensemble {
     /// Takes a simulation into account: values in RING order, NaN where masked.
     ///
     /// # Errors
-    /// [`Error::Pixels`].
-    pub fn add(&mut self, simulation: &[f64]) -> Result<(), Error> {
+    /// [`ComparisonError::Pixels`].
+    pub(super) fn add(&mut self, simulation: &[f64]) -> Result<(), ComparisonError> {
         self.check(simulation)?;
-        let places = self.places.par_iter_mut().zip(&self.data).zip(simulation);
+        let places = self.places.par_iter_mut().zip(&*self.data).zip(simulation);
         places.filter(|(_, value)| !value.is_nan()).for_each(|((place, data), value)| {
             *place = place.with(*value);
             place.twice_below += if value < data { 2 } else { u64::from(value == data) };
@@ -126,24 +131,26 @@ impl Ensemble {
         Ok(())
     }
 
-    fn check(&self, simulation: &[f64]) -> Result<(), Error> {
+    fn check(&self, simulation: &[f64]) -> Result<(), ComparisonError> {
         let (found, expected) = (simulation.len(), self.data.len());
-        if found == expected { Ok(()) } else { Err(Error::Pixels { found, expected }) }
+        if found == expected { Ok(()) } else { Err(ComparisonError::Pixels { found, expected }) }
     }
 
     /// The data.
-    pub fn data(&self) -> &[f64] {
-        &self.data
+    pub(super) fn into_data(self) -> Cow<'a, [f64]> {
+        self.data
     }
 
     /// How the data lies among the simulations. Where it is masked, all but mean, scatter and count is undefined.
-    pub fn deviation(&self) -> Deviation {
-        let column = |of: &(dyn Fn(&Place, f64) -> f64 + Sync)| -> Vec<f64> {
-            self.places.par_iter().zip(&self.data).map(|(place, data)| of(place, *data)).collect()
+    pub(super) fn deviation(&self) -> Deviation {
+        let column = |of: &(dyn Fn(&Place, f64) -> f64 + Sync)| -> Array1<f64> {
+            let values: Vec<f64> =
+                self.places.par_iter().zip(&*self.data).map(|(place, data)| of(place, *data)).collect();
+            values.into()
         };
         let defined = |x: f64, yes: bool| if yes { x } else { f64::NAN };
         let local = |p: &Place, data: f64| {
-            let share = 50.0 * p.twice_below as f64 / f64::from(p.count);
+            let share = percent(u128::from(p.twice_below), u64::from(p.count));
             defined(share, !data.is_nan() && p.count > 0)
         };
         let percentiles = self.percentiles();
@@ -169,28 +176,28 @@ impl Ensemble {
             below += slots[0];
             let twice = 2 * u128::from(below) + u128::from(slots[1]);
             below += slots[1];
-            if all > 0 { 50.0 * twice as f64 / all as f64 } else { f64::NAN }
+            percent(twice, all)
         };
         self.histogram.chunks_exact(2).map(percentile).collect()
     }
 
     /// The largest |σ| of the data over all pixels; nothing where it is undefined at all of them.
-    pub fn largest(&self) -> Option<f64> {
-        largest(self.places.par_iter().zip(&self.data).map(|(place, data)| place.sigma(*data)))
+    pub(super) fn largest(&self) -> Option<f64> {
+        largest(self.places.par_iter().zip(&*self.data).map(|(place, data)| place.sigma(*data)))
     }
 
     /// The largest |σ| of a simulation that was [`add`](Self::add)ed before, over all of its pixels, from the mean and
     /// scatter of all other simulations and the data: what [`largest`](Self::largest) would be were this one the data.
     ///
     /// # Errors
-    /// [`Error::Pixels`].
-    pub fn largest_left_out(&self, simulation: &[f64]) -> Result<Option<f64>, Error> {
+    /// [`ComparisonError::Pixels`].
+    pub(super) fn largest_left_out(&self, simulation: &[f64]) -> Result<Option<f64>, ComparisonError> {
         self.check(simulation)?;
         let sigma = |((place, data), value): ((&Place, &f64), &f64)| {
             let all = if data.is_nan() { *place } else { place.with(*data) };
             all.sigma_left_out(*value)
         };
-        Ok(largest(self.places.par_iter().zip(&self.data).zip(simulation).map(sigma)))
+        Ok(largest(self.places.par_iter().zip(&*self.data).zip(simulation).map(sigma)))
     }
 }
 
@@ -244,7 +251,7 @@ mod tests {
         (0..maps).map(|_| (0..pixels).map(&mut value).collect()).collect()
     }
 
-    fn of(maps: &[Vec<f64>]) -> Ensemble {
+    fn of(maps: &[Vec<f64>]) -> Ensemble<'static> {
         let mut ensemble = Ensemble::new(maps[0].clone());
         maps[1..].iter().for_each(|map| ensemble.add(map).unwrap());
         ensemble
@@ -349,7 +356,7 @@ mod tests {
         assert!(found.mean[2].is_nan() && found.global_percentile[2].is_nan());
         let empty = of(&[vec![1.0], vec![nan]]);
         assert!(empty.deviation().global_percentile[0].is_nan() && empty.largest().is_none());
-        assert_eq!(Ensemble::new(vec![1.0]).add(&[1.0, 2.0]), Err(Error::Pixels { found: 2, expected: 1 }));
+        assert_eq!(Ensemble::new(vec![1.0]).add(&[1.0, 2.0]), Err(ComparisonError::Pixels { found: 2, expected: 1 }));
     }
 
     #[test]

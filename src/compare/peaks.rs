@@ -1,6 +1,8 @@
 //! The places of a map that deviate most, each apart from all others.
 
 use longan_grid::Healpix;
+use longan_grid::disc::Disc;
+use ndarray::ArrayView1;
 
 /// A pixel that deviates more than all about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,36 +13,38 @@ pub struct Peak {
     pub lon: f64,
     /// Latitude of its centre in degrees.
     pub lat: f64,
-    /// What it deviates by.
+    /// The deviation, in standard deviations.
     pub sigma: f64,
 }
 
 /// The pixels of largest |σ|, the largest first: at most `most`, none below `level`, and none within `distance`
 /// degrees of one before it. Of equal ones the first in RING order goes first.
-pub fn peaks(grid: Healpix, sigma: &[f64], distance: f64, level: f64, most: usize) -> Vec<Peak> {
+pub fn peaks<'a>(
+    grid: Healpix,
+    sigma: impl Into<ArrayView1<'a, f64>>,
+    distance: f64,
+    level: f64,
+    most: usize,
+) -> Vec<Peak> {
+    let sigma = sigma.into();
     let mut pixels: Vec<usize> = (0..sigma.len().min(grid.pixels())).filter(|&p| sigma[p].abs() >= level).collect();
     pixels.sort_by(|&a, &b| sigma[b].abs().total_cmp(&sigma[a].abs()));
     let distance = distance.to_radians();
     let mut peaks: Vec<Peak> = Vec::new();
-    let mut centres: Vec<(f64, f64)> = Vec::new();
+    let mut is_near = vec![false; grid.pixels()];
     for pixel in pixels {
         if peaks.len() >= most {
             break;
         }
-        let (theta, phi) = grid.centre(pixel);
-        if centres.iter().all(|&other| apart((theta, phi), other) > distance) {
-            centres.push((theta, phi));
-            let (lon, lat) = (phi.to_degrees(), 90.0 - theta.to_degrees());
-            peaks.push(Peak { pixel, lon, lat, sigma: sigma[pixel] });
+        if is_near[pixel] {
+            continue;
         }
+        let (theta, phi) = grid.centre(pixel);
+        Disc::new(theta, phi, distance).pixels(grid).for_each(|near| is_near[near] = true);
+        let (lon, lat) = (phi.to_degrees(), 90.0 - theta.to_degrees());
+        peaks.push(Peak { pixel, lon, lat, sigma: sigma[pixel] });
     }
     peaks
-}
-
-/// The distance of two points, colatitude and longitude, in radians.
-fn apart((theta, phi): (f64, f64), (other_theta, other_phi): (f64, f64)) -> f64 {
-    let [across, along] = [theta - other_theta, phi - other_phi].map(|x| (x / 2.0).sin().powi(2));
-    2.0 * (across + theta.sin() * other_theta.sin() * along).min(1.0).sqrt().asin()
 }
 
 #[cfg(test)]

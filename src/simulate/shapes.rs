@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec3, dvec3};
-use longan_grid::{Healpix, Map};
+use longan_grid::{Healpix, Map, directions};
 
 use super::Error;
 
@@ -239,7 +239,7 @@ pub fn scene() -> Vec<Body> {
 }
 
 fn unit_vector(theta: f64, phi: f64) -> DVec3 {
-    dvec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
+    DVec3::from_array(directions::at_colatitude(theta, phi))
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::reach::{OutputRing, Reached};
-use super::{Block, Summation, Sums, Ways, direct};
+use super::{Block, Summation, SummationCounts, Sums, direct};
 use crate::moments::Layout;
 use crate::transport::RingTransport;
 use fit::Terms;
@@ -100,18 +100,18 @@ impl Plan {
     }
 
     /// How the block's windows are summed.
-    pub(super) fn ways(&self, block: &Block<'_>) -> Ways {
+    pub(super) fn counts(&self, block: &Block<'_>) -> SummationCounts {
         let terms = self.ranks.iter().map(|rank| rank.terms.count()).max().unwrap_or(0);
-        let mut ways = Ways { error: self.error, terms, ..Ways::default() };
+        let mut counts = SummationCounts { error: self.error, terms, ..SummationCounts::default() };
         for (pair, met) in self.fits.iter().enumerate() {
             let pixels = 4 * block.output[pair % block.output.len()].in_quadrant;
             match met {
-                Some(true) => ways.prefix += pixels,
-                Some(false) => ways.missed += pixels,
+                Some(true) => counts.prefix += pixels,
+                Some(false) => counts.missed += pixels,
                 None => (),
             }
         }
-        ways
+        counts
     }
 }
 

@@ -1,14 +1,13 @@
-//! Which pixels of an input ring lie in the windows about an output ring. Both ways of summing ask here, and smoothing.
+//! Pixels of an input ring that lie in the windows about an output ring. Both ways of summing ask here, and smoothing.
+//! How far a disc reaches along a ring is left to [`longan_grid::disc`].
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
+use longan_grid::disc::{half_width, rings_within};
 use longan_grid::{Healpix, Ring};
 
 use crate::transport::RingTransport;
-
-/// A pixel belongs to a window whose edge its centre lies on; distances in radians within this are the same.
-const EDGE: f64 = 1e-12;
 
 /// An output ring and the input rings that windows about its pixels reach.
 #[derive(Debug)]
@@ -63,15 +62,12 @@ impl OutputRing {
         if !self.reach.contains(&number) {
             return None;
         }
-        // sin²(d/2) = sin²((θ_x − θ_w)/2) + sin θ_x sin θ_w sin²(Δφ/2), free of cancellation.
-        let half = (radius + EDGE) / 2.0;
-        let beyond = half.sin().powi(2) - ((theta - self.theta) / 2.0).sin().powi(2);
-        let sin_sq = if half < PI / 2.0 { beyond / (ring.sin_theta * self.ring.sin_theta) } else { 1.0 };
-        (sin_sq >= 0.0).then(|| Reached {
+        let half_width = half_width(radius, (self.theta, self.ring.sin_theta), (theta, ring.sin_theta))?;
+        Some(Reached {
             len: ring.len,
             phi: (ring.phi(0), TAU / ring.len as f64),
             per_radian: ring.len as f64 / TAU,
-            half_width: if sin_sq < 1.0 { 2.0 * sin_sq.sqrt().asin() } else { PI },
+            half_width,
             transport: RingTransport::new((ring.sin_theta, ring.cos_theta), (self.ring.sin_theta, self.ring.cos_theta)),
         })
     }
@@ -115,19 +111,4 @@ impl Reached {
     pub(crate) fn column(&self, j: isize, quadrant: usize) -> usize {
         (j + (quadrant * self.len / 4) as isize).rem_euclid(self.len as isize) as usize
     }
-}
-
-/// The input rings that windows of a radius about colatitude `theta` may reach.
-fn rings_within(input: Healpix, theta: f64, radius: f64) -> Range<usize> {
-    let first_south_of = |theta: f64| {
-        let (mut north, mut south) = (1, input.rings() + 1);
-        while north < south {
-            let middle = (north + south) / 2;
-            if input.ring(middle).theta() < theta { north = middle + 1 } else { south = middle }
-        }
-        north
-    };
-    // One ring more on each side: which pixels are in the window is decided for each ring.
-    let (north, south) = (first_south_of(theta - radius), first_south_of(theta + radius));
-    north.saturating_sub(1).max(1)..(south + 1).min(input.rings() + 1)
 }

@@ -1,4 +1,4 @@
-//! What a comparison has found, for people and for programs.
+//! The findings of a comparison, for people and for programs.
 
 use std::fmt::Write;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::super::options::decimals;
 
-/// The whole of it.
+/// The findings of all measures.
 #[derive(Serialize)]
 pub(super) struct Report {
     /// The file of the data.
@@ -28,7 +28,7 @@ pub(super) struct Report {
     pub(super) scatter: Vec<String>,
 }
 
-/// What it has found of one measure.
+/// The findings of one measure.
 #[derive(Serialize)]
 pub(super) struct OfMeasure {
     /// The column.
@@ -67,7 +67,7 @@ pub(super) struct Region {
 }
 
 impl Report {
-    /// It as text.
+    /// The report as text.
     pub(super) fn text(&self) -> String {
         let mut out = String::new();
         // Writing to a string does not fail.

@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{Context, bail, ensure};
+use longan::measures::Quantity;
 use longan_formats::is_alike;
 use longan_grid::Healpix;
-use longan_picture::cloud::{Cloud, Quantity};
+use longan_picture::cloud::{AxisLabel, Cloud};
 
-use super::super::drawn::{Form, save};
 use super::super::options::{between, shown};
-use super::said::{Column, Said};
+use super::super::picture_format::{Form, save};
+use super::provenance_reader::{Column, MadeFrom};
 
 /// A point of the sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +88,7 @@ impl Scatter {
 
     /// Refuses measures that are not among these, whatever their windows and thresholds.
     pub(super) fn check_among(&self, measures: &[Column]) -> anyhow::Result<()> {
-        let plain = |name: &str| Column::to_be(name.to_ascii_uppercase().replace('-', "_"), "");
+        let plain = |name: &str| Column::to_be(name.to_ascii_uppercase().replace('-', "_"), "", Quantity::Number);
         for name in &self.names {
             if !measures.iter().any(|measure| plain(name).is_called(&measure.name)) {
                 let measures: Vec<&str> = measures.iter().map(|measure| measure.name.as_str()).collect();
@@ -98,7 +99,7 @@ impl Scatter {
     }
 
     /// Refuses data that is masked at its place. Smoothing leaves masked pixels as they are.
-    pub(super) fn check(&self, data: &Said) -> anyhow::Result<()> {
+    pub(super) fn check(&self, data: &MadeFrom) -> anyhow::Result<()> {
         let pair = self.pair(&data.columns)?.map(|i| &data.columns[i]);
         let maps = [data.read(pair[0])?.into_values(), data.read(pair[1])?.into_values()];
         let grid = Healpix::new(data.nside)?;
@@ -159,7 +160,7 @@ impl Scatter {
         overwrite: bool,
     ) -> anyhow::Result<Vec<String>> {
         let table = table(files, points, columns).context("the table of the scatter plot")?;
-        let [x, y] = columns.map(|column| Quantity { name: column.name.clone(), unit: column.unit.clone() });
+        let [x, y] = columns.map(|column| AxisLabel { name: column.name.clone(), unit: column.unit.clone() });
         let mut points: Vec<(f64, f64)> = points.iter().map(|[x, y]| (*x, *y)).collect();
         let star = points.remove(0);
         let legend = [format!("{} simulations", points.len()), files[0].to_string_lossy().into_owned()];

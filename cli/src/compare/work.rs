@@ -11,14 +11,14 @@ use anyhow::{Context, bail, ensure};
 use longan::measures::Measure;
 use longan_formats::{self as formats, Error};
 
-use super::super::jobs::Jobs;
 use super::super::mapping::Mapping;
 use super::super::options::{Running, is_same_file, shown};
 use super::super::output::command;
+use super::super::parallel::Jobs;
 use super::super::progress::Progress;
 use super::super::regridding;
 use super::super::sink::Kind;
-use super::said::{Said, made_of};
+use super::provenance_reader::{MadeFrom, made_of};
 
 /// Name of the file that says by which options the Minkowski maps of a folder are made.
 const OPTIONS: &str = "options.txt";
@@ -31,11 +31,11 @@ pub(super) fn minkowski_maps(
     measures: Vec<Arc<dyn Measure>>,
     jobs: &Jobs,
     running: &Running,
-) -> anyhow::Result<Vec<Said>> {
+) -> anyhow::Result<Vec<MadeFrom>> {
     let mapper = mapping.mapper(measures, jobs.memory(), running, true)?;
     let outputs = outputs(folder, inputs)?;
     for path in inputs {
-        if Said::of(path, mapping.input().hdu).is_ok_and(|said| said.is_some()) {
+        if MadeFrom::of(path, mapping.input().hdu).is_ok_and(|said| said.is_some()) {
             bail!("{}: this is a Minkowski map of longan already; compare it without --work", shown(path));
         }
         let steps = mapping.input().open(path)?.steps();
@@ -63,7 +63,7 @@ pub(super) fn minkowski_maps(
     // The others are done, and are not done again when this one can be.
     made.into_iter().collect::<anyhow::Result<()>>()?;
     let said = |output: &PathBuf| {
-        Said::of(output, None)?
+        MadeFrom::of(output, None)?
             .with_context(|| format!("{}: this is no Minkowski map of longan; remove it", shown(output)))
     };
     outputs.iter().map(said).collect()
@@ -118,9 +118,7 @@ fn record(folder: &Path, mapping: &Mapping, outputs: &[PathBuf]) -> anyhow::Resu
                     shown(output)
                 );
             }
-            let write =
-                |path: &Path| fs::write(path, &options).map_err(|cause| Error::Io { action: "write it", cause });
-            formats::save(&path, false, write)?;
+            formats::save(&path, false, |path| fs::write(path, &options).map_err(Error::io("write it")))?;
         }
     }
     Ok(())

@@ -1,15 +1,12 @@
 //! The picture of a graph: a panel for each measure, curves of all maps, bands of the ensemble.
 
 use longan::Body;
+use longan::graph::{BAND_68, BAND_95, Density, Ensemble, Graph, GraphError, Ordinate};
 use longan_picture::Drawing;
 use longan_picture::axes::BLACK;
 use longan_picture::chart::{Band, Chart, Curve, Panel, Sample, Shared};
 
-use super::ensemble::{Ensemble, percentile, quantile};
-use super::{Curves, Kind, Plan, Quantity};
-
-/// Lower ends of the bands, as shares of the ensemble; the upper ones are as far from 1.
-const BANDS: [f64; 2] = [0.025, 0.16];
+use super::{MapCurves, in_sigma};
 
 /// Ratios of successive thresholds that differ by no more than this share are the same.
 const EVEN: f64 = 1e-9;
@@ -18,33 +15,34 @@ const EVEN: f64 = 1e-9;
 const FINER: usize = 8;
 
 /// The picture.
-pub(super) fn draw(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> anyhow::Result<Drawing> {
-    Ok(chart(plan, data, ensemble).draw()?)
+pub(super) fn draw(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>) -> anyhow::Result<Drawing> {
+    Ok(chart(graph, data, ensemble)?.draw()?)
 }
 
-fn chart(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> Chart {
-    let panels: Vec<Panel> = (0..plan.quantities.len()).map(|q| panel(plan, data, ensemble, q)).collect();
-    let units: Vec<&str> = data.iter().filter_map(|curves| curves.unit.as_deref()).collect();
+fn chart(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>) -> Result<Chart, GraphError> {
+    let panels = (0..graph.ordinates().len()).map(|q| panel(graph, data, ensemble, q));
+    let panels = panels.collect::<Result<Vec<Panel>, _>>()?;
+    let units: Vec<&str> = data.iter().filter_map(|map| map.unit.as_deref()).collect();
     let unit = match units.first() {
-        _ if plan.in_sigma() => "σ",
+        _ if in_sigma(graph) => "σ",
         Some(unit) if units.len() == data.len() && units.iter().all(|other| other == unit) => unit,
         _ => "",
     };
     let mut legend: Vec<(Sample, String)> =
-        data.iter().enumerate().map(|(i, curves)| (Sample::Line(i), curves.label())).collect();
-    if plan.gaussian {
+        data.iter().enumerate().map(|(i, map)| (Sample::Line(i), map.label())).collect();
+    if graph.gaussian {
         legend.push((Sample::Dashed, "Gaussian field of the same σ₀, σ₁".to_owned()));
     }
     if let Some(ensemble) = ensemble {
-        legend.push((Sample::Bands, format!("68 %, 95 % of {} simulations", ensemble.count)));
+        legend.push((Sample::Bands, format!("68 %, 95 % of {} simulations", ensemble.simulations())));
         if panels.iter().flat_map(|panel| &panel.curves).any(|curve| !curve.marked.is_empty()) {
             legend.push((Sample::Dot, "outside 95 %".to_owned()));
         }
     }
-    if plan.analysis.body == Body::Below {
+    if graph.analysis.body == Body::Below {
         legend.push((Sample::None, "body below the threshold".to_owned()));
     }
-    if let Some([longitude, latitude, radius]) = plan.region.map(|region| region.degrees()) {
+    if let Some([longitude, latitude, radius]) = graph.region.map(|region| region.degrees()) {
         let place = format!("within {radius}° of longitude {longitude}°, latitude {latitude}°");
         // A true minus sign, as on the axes.
         legend.push((Sample::None, place.replace('-', "−")));
@@ -52,9 +50,9 @@ fn chart(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> Chart {
     let shared = Shared {
         name: "threshold".to_owned(),
         unit: unit.to_owned(),
-        logarithmic: !plan.in_sigma() && evenly_in_logarithm(plan.analysis.thresholds.values()),
+        logarithmic: !in_sigma(graph) && evenly_in_logarithm(graph.analysis.thresholds.values()),
     };
-    Chart { shared, panels, legend }
+    Ok(Chart { shared, panels, legend })
 }
 
 /// Whether thresholds were spaced logarithmically.
@@ -64,47 +62,33 @@ fn evenly_in_logarithm(thresholds: &[f64]) -> bool {
     thresholds.len() > 2 && thresholds[0] > 0.0 && thresholds.windows(3).all(even)
 }
 
-fn panel(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>, q: usize) -> Panel {
-    let x = |curves: &Curves, t: usize| match plan.in_sigma() {
-        true => plan.analysis.thresholds.values()[t],
-        false => curves.thresholds[t],
-    };
-    let quantity = &plan.quantities[q];
-    let thresholds = 0..plan.analysis.thresholds.values().len();
-    let mut panel = Panel { name: title(plan, quantity), unit: plan.unit(quantity).to_owned(), ..Panel::default() };
+fn panel(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>, q: usize) -> Result<Panel, GraphError> {
+    let x = |map: &MapCurves, t: usize| if in_sigma(graph) { map.curves.sigmas[t] } else { map.curves.thresholds[t] };
+    let ordinate = &graph.ordinates()[q];
+    let thresholds = 0..graph.analysis.thresholds.values().len();
+    let mut panel = Panel { name: title(graph, ordinate), unit: ordinate.unit().to_owned(), ..Panel::default() };
     if let Some(ensemble) = ensemble {
-        panel.bands.extend(BANDS.map(|share| {
-            Band {
-                ends: thresholds
-                    .clone()
-                    .map(|t| {
-                        let all = ensemble.at(q, t);
-                        (x(&data[0], t), quantile(all, share), quantile(all, 1.0 - share))
-                    })
-                    .collect(),
-                inner: share != BANDS[0],
-            }
+        panel.bands.extend([BAND_95, BAND_68].map(|band| {
+            let [low, high] = ensemble.band(band);
+            let ends = thresholds.clone().map(|t| (x(&data[0], t), low[[q, t]], high[[q, t]])).collect();
+            Band { ends, inner: band == BAND_68 }
         }));
     }
-    for (colour, curves) in data.iter().enumerate() {
-        let values = &curves.values[q];
-        let outside = |t: &usize| {
-            let percent = ensemble.map_or(f64::NAN, |ensemble| percentile(ensemble.at(q, *t), values[*t].value));
-            (percent - 50.0).abs() > 100.0 * (0.5 - BANDS[0])
-        };
-        let points = thresholds.clone().map(|t| (x(curves, t), values[t].value)).collect();
+    for (colour, map) in data.iter().enumerate() {
+        let outside = ensemble.map(|ensemble| ensemble.outside(&map.curves, BAND_95)).transpose()?;
+        let is_outside = |t: &usize| outside.as_ref().is_some_and(|outside| outside[[q, *t]]);
         panel.curves.push(Curve {
-            points,
+            points: thresholds.clone().map(|t| (x(map, t), map.curves.values[[q, t]])).collect(),
             colour,
             dashed: false,
-            marked: thresholds.clone().filter(outside).collect(),
+            marked: thresholds.clone().filter(is_outside).collect(),
         });
     }
-    if let Kind::Density(density) = &quantity.kind {
-        for (colour, curves) in data.iter().enumerate() {
-            let Some(gaussian) = &curves.gaussian else { continue };
+    if let Ordinate::Density(density) = ordinate {
+        for (colour, map) in data.iter().enumerate() {
+            let Some(gaussian) = &map.curves.gaussian else { continue };
             let expected =
-                |(x, threshold): (f64, f64)| (x, (density.of)(&gaussian.per_area(threshold, plan.analysis.body)));
+                |(x, threshold): (f64, f64)| (x, density.of(&gaussian.per_area(threshold, graph.analysis.body)));
             let points = thresholds.clone().flat_map(|t| {
                 let next = (t + 1).min(thresholds.end - 1);
                 let steps = if t < next { FINER } else { 1 };
@@ -112,10 +96,8 @@ fn panel(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>, q: usize) ->
             });
             let between = |a: f64, b: f64, share: f64| a + (b - a) * share;
             let points = points.map(|(t, next, share)| {
-                (
-                    between(x(curves, t), x(curves, next), share),
-                    between(curves.thresholds[t], curves.thresholds[next], share),
-                )
+                let threshold = between(map.curves.thresholds[t], map.curves.thresholds[next], share);
+                (between(x(map, t), x(map, next), share), threshold)
             });
             // One alone stands out in black.
             let colour = if data.len() == 1 { BLACK } else { colour };
@@ -127,13 +109,22 @@ fn panel(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>, q: usize) ->
             });
         }
     }
-    panel
+    Ok(panel)
 }
 
-fn title(plan: &Plan, quantity: &Quantity) -> String {
-    match (&quantity.kind, plan.analysis.windows[0]) {
-        (Kind::Density(density), _) => density.title.to_owned(),
-        (Kind::Mean(_), 0.0) => format!("⟨{}⟩ of pixels", quantity.name),
-        (Kind::Mean(_), window) => format!("⟨{}⟩, windows of {window}°", quantity.name),
+fn title(graph: &Graph, ordinate: &Ordinate) -> String {
+    let density = match ordinate {
+        Ordinate::Mean(_) => match graph.analysis.windows[0] {
+            0.0 => return format!("⟨{}⟩ of pixels", ordinate.name()),
+            window => return format!("⟨{}⟩, windows of {window}°", ordinate.name()),
+        },
+        Ordinate::Density(density) => density,
+    };
+    match density {
+        Density::Area => "area fraction W₀/A",
+        Density::Length => "contour length W₁/A",
+        Density::Curvature => "curvature W₂/A",
+        Density::Euler => "Euler characteristic χ/A",
     }
+    .to_owned()
 }

@@ -1,28 +1,30 @@
 //! The numbers of a graph as CSV, one value a row.
 
-use super::ensemble::{Ensemble, percentile, quantile};
-use super::{Curves, Kind, Plan, Value};
+use longan::Body;
+use longan::graph::{BAND_68, BAND_95, Ensemble, Graph};
+
+use super::MapCurves;
 
 /// Shares of the ensemble whose quantiles are told, each with its column.
 const QUANTILES: [(f64, &str); 5] = [
     (0.5, "ensemble_median"),
-    (0.025, "ensemble_p2.5"),
-    (0.16, "ensemble_p16"),
-    (0.84, "ensemble_p84"),
-    (0.975, "ensemble_p97.5"),
+    (BAND_95[0], "ensemble_p2.5"),
+    (BAND_68[0], "ensemble_p16"),
+    (BAND_68[1], "ensemble_p84"),
+    (BAND_95[1], "ensemble_p97.5"),
 ];
 
 /// The CSV. Columns that do not apply to the graph are left out, cells that do not apply to a row are empty.
-pub(super) fn csv(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> anyhow::Result<Vec<u8>> {
-    let timed = data.iter().any(|curves| curves.time.is_some());
+pub(super) fn csv(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>) -> anyhow::Result<Vec<u8>> {
+    let timed = data.iter().any(|map| map.time.is_some());
     let mut head = vec!["input"];
     head.extend(timed.then_some("time"));
     head.extend(["measure", "unit", "body"]);
-    if plan.region.is_some() {
+    if graph.region.is_some() {
         head.extend(["region_lon", "region_lat", "region_radius"]);
     }
     head.extend(["window", "threshold", "threshold_sigma", "value", "area_sr", "windows"]);
-    if plan.gaussian {
+    if graph.gaussian {
         head.extend(["sigma0", "sigma1", "gaussian"]);
     }
     if ensemble.is_some() {
@@ -31,28 +33,32 @@ pub(super) fn csv(plan: &Plan, data: &[Curves], ensemble: Option<&Ensemble>) -> 
     }
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record(&head)?;
-    for curves in data {
-        for (q, quantity) in plan.quantities.iter().enumerate() {
-            for (t, Value { value, windows, gaussian }) in curves.values[q].iter().enumerate() {
-                let mut row = vec![curves.path.to_string_lossy().into_owned()];
-                row.extend(timed.then(|| curves.time.clone().unwrap_or_default()));
-                row.extend([quantity.name.clone(), plan.unit(quantity).to_owned(), plan.body().to_owned()]);
-                row.extend(plan.region.iter().flat_map(|region| region.degrees()).map(number));
-                let of_windows = matches!(quantity.kind, Kind::Mean(_));
-                row.push(if of_windows { number(plan.analysis.windows[0]) } else { String::new() });
-                row.push(number(curves.thresholds[t]));
-                row.push(curves.in_sigma(plan, t).map(number).unwrap_or_default());
-                row.push(number(*value));
-                row.push(curves.area.filter(|_| !of_windows).map(number).unwrap_or_default());
-                row.push(windows.map(|windows| windows.to_string()).unwrap_or_default());
+    let body = match graph.analysis.body {
+        Body::Above => "above",
+        Body::Below => "below",
+    };
+    let quantiles: Vec<_> =
+        ensemble.iter().flat_map(|ensemble| QUANTILES.map(|(share, _)| ensemble.quantile(share))).collect();
+    for MapCurves { path, time, curves, .. } in data {
+        let among = ensemble.map(|ensemble| anyhow::Ok((ensemble.counts(), ensemble.percentile(curves)?)));
+        let among = among.transpose()?;
+        for (q, curve) in curves.iter().enumerate() {
+            for (t, value) in curve.values.iter().enumerate() {
+                let mut row = vec![path.to_string_lossy().into_owned()];
+                row.extend(timed.then(|| time.clone().unwrap_or_default()));
+                row.extend([curve.ordinate.name(), curve.ordinate.unit().to_owned(), body.to_owned()]);
+                row.extend(graph.region.iter().flat_map(|region| region.degrees()).map(number));
+                row.push(curve.windows.map(|_| number(graph.analysis.windows[0])).unwrap_or_default());
+                row.extend([curves.thresholds[t], curves.sigmas[t], *value].map(number));
+                row.push(curves.area.filter(|_| curve.windows.is_none()).map(number).unwrap_or_default());
+                row.push(curve.windows.map(|windows| windows[t].to_string()).unwrap_or_default());
                 if let Some(of_map) = &curves.gaussian {
                     row.extend([of_map.sigma0, of_map.sigma1].map(number));
-                    row.push(gaussian.map(number).unwrap_or_default());
+                    row.push(curve.expected.map(|expected| number(expected[t])).unwrap_or_default());
                 }
-                if let Some(ensemble) = ensemble {
-                    let all = ensemble.at(q, t);
-                    row.extend([all.len().to_string(), number(percentile(all, *value))]);
-                    row.extend(QUANTILES.map(|(share, _)| number(quantile(all, share))));
+                if let Some((counts, percentiles)) = &among {
+                    row.extend([counts[[q, t]].to_string(), number(percentiles[[q, t]])]);
+                    row.extend(quantiles.iter().map(|quantile| number(quantile[[q, t]])));
                 }
                 csv.write_record(&row)?;
             }

@@ -1,4 +1,4 @@
-use longan::compare::{Ensemble, Rank, peaks};
+use longan::compare::{Comparison, Outcome};
 use longan::simulate::Waves;
 use longan::{Analysis, Healpix, measures::find};
 use rayon::prelude::*;
@@ -47,17 +47,26 @@ fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap()
 }
 
+/// Both passes over the simulations.
+fn outcome<'a>(data: &'a [f64], simulations: &[Vec<f64>]) -> Outcome<'a> {
+    let mut comparison = Comparison::new(data).unwrap();
+    simulations.iter().for_each(|map| comparison.first(map).unwrap());
+    simulations.iter().for_each(|map| comparison.second(map).unwrap());
+    comparison.finish().unwrap()
+}
+
 #[test]
 fn columns_are_those_of_the_library() {
     let folder = with_maps(6, MEASURES);
     let printed = done(&folder, "compare data.fits sims/*.fits -o out.fits");
     assert!(printed.starts_with("data.fits among 6 simulations, Nside 8\n\nEVQ in windows of 12 deg: "), "{printed}");
     for measure in ["EVQ", "W1", "RANK4_MID"] {
-        let mut ensemble = Ensemble::new(folder.read("data.fits", measure).into_values());
+        let data = folder.read("data.fits", measure);
+        let mut comparison = Comparison::new(data.values()).unwrap();
         for i in 1..=6 {
-            ensemble.add(folder.read(format!("sims/{i}.fits"), measure).values()).unwrap();
+            comparison.first(folder.read(format!("sims/{i}.fits"), measure).values()).unwrap();
         }
-        let expected = ensemble.deviation();
+        let expected = comparison.deviation();
         for (suffix, expected) in [
             ("MEAN", expected.mean),
             ("STD", expected.std),
@@ -67,7 +76,7 @@ fn columns_are_those_of_the_library() {
             ("COUNT", expected.count),
         ] {
             let found = folder.read("out.fits", &format!("{measure}_{suffix}"));
-            assert_eq!(difference(found.values(), &expected), 0.0, "{measure}_{suffix}");
+            assert_eq!(difference(found.values(), &expected.to_vec()), 0.0, "{measure}_{suffix}");
         }
     }
     let header = &folder.headers("out.fits")[0];
@@ -170,9 +179,11 @@ fn maps_are_smoothed_first() {
     assert!(printed.contains("smoothed by 20 deg"), "{printed}");
     let smoothing = longan::smoothing::Smoothing::new(Healpix::new(8).unwrap(), 20.0).unwrap();
     let smooth = |name: String| smoothing.apply(&[folder.read(name, "EVQ").values()]).unwrap().remove(0);
-    let mut ensemble = Ensemble::new(smooth("data.fits".into()));
-    (1..=3).for_each(|i| ensemble.add(&smooth(format!("sims/{i}.fits"))).unwrap());
-    assert_eq!(difference(folder.read("out.fits", "EVQ_SIGMA").values(), &ensemble.deviation().sigma), 0.0);
+    let data = smooth("data.fits".into());
+    let mut comparison = Comparison::new(&data).unwrap();
+    (1..=3).for_each(|i| comparison.first(&smooth(format!("sims/{i}.fits"))).unwrap());
+    let sigma = comparison.deviation().sigma.to_vec();
+    assert_eq!(difference(folder.read("out.fits", "EVQ_SIGMA").values(), &sigma), 0.0);
     assert_eq!(folder.headers("out.fits")[0]["SMOOTH"], "20.0");
     folder.refused(&all(&folder, "compare data.fits sims/*.fits -o no.fits --smooth 14"), &["14", "Nside 8", "14.6"]);
     folder.misused(&all(&folder, "compare data.fits sims/*.fits -o no.fits --smooth 181"), &["--smooth", "180"]);
@@ -362,7 +373,14 @@ fn evq(nside: usize, seed: u64, planted: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     });
     let map = longan::Map::new("waves", values.collect()).unwrap();
     let analysis = Analysis { windows: vec![10.0], nside_out: Some(8), ..Analysis::default() };
-    analysis.minkowski_maps(&map, &[find("evq").unwrap()], |_| ()).unwrap().remove(0).values.remove(0)
+    analysis
+        .minkowski_maps(&map, &[find("evq").unwrap()], longan::go_on)
+        .unwrap()
+        .blocks
+        .remove(0)
+        .values
+        .row(0)
+        .to_vec()
 }
 
 #[test]
@@ -370,13 +388,9 @@ fn aligned_structures_are_found_where_they_are_planted() {
     const SIMULATIONS: u64 = 40;
     let simulations: Vec<Vec<f64>> = (1..=SIMULATIONS).into_par_iter().map(|seed| evq(64, seed, |_, _| 0.0)).collect();
     let compared = |data: Vec<f64>| {
-        let mut ensemble = Ensemble::new(data);
-        simulations.iter().for_each(|map| ensemble.add(map).unwrap());
-        let largest = simulations.iter().map(|map| ensemble.largest_left_out(map).unwrap());
-        let rank = Rank::new(ensemble.largest().unwrap(), largest);
-        let sigma = ensemble.deviation().sigma;
-        let found = peaks(Healpix::new(8).unwrap(), &sigma, 20.0, 4.0, 3);
-        (found, rank.p_value())
+        let outcome = outcome(&data, &simulations);
+        let found: Vec<_> = outcome.outliers(20.0, 4.0, 3).iter().map(|outlier| outlier.peak).collect();
+        (found, outcome.rank.unwrap().p_value())
     };
     // Stripes along the meridians within some 15 degrees of (120, 20).
     let (lon, lat) = (120f64, 20f64);
@@ -401,13 +415,15 @@ fn skies_without_structures_are_not_reported_more_often_than_stated() {
     // than 1 of 3000 runs, and seeds are fixed.
     let analysis = Analysis { windows: vec![15.0], nside_out: Some(4), ..Analysis::default() };
     let measure = [find("evq").unwrap()];
-    let evq = |seed| analysis.minkowski_maps(&noise(16, 1000, seed), &measure, |_| ()).unwrap()[0].values[0].clone();
+    let evq = |seed| {
+        analysis.minkowski_maps(&noise(16, 1000, seed), &measure, longan::go_on).unwrap().blocks[0]
+            .values
+            .row(0)
+            .to_vec()
+    };
     let reported = |sky: u64| {
         let simulations: Vec<Vec<f64>> = (1..20).map(|i| evq(100 * sky + i)).collect();
-        let mut ensemble = Ensemble::new(evq(100 * sky));
-        simulations.iter().for_each(|map| ensemble.add(map).unwrap());
-        let largest = simulations.iter().map(|map| ensemble.largest_left_out(map).unwrap());
-        Rank::new(ensemble.largest().unwrap(), largest).p_value() <= 0.05
+        outcome(&evq(100 * sky), &simulations).rank.unwrap().p_value() <= 0.05
     };
     let reported = (0..40).into_par_iter().filter(|sky| reported(*sky)).count();
     assert!(reported <= 8, "{reported} of 40");

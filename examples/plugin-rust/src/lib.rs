@@ -6,7 +6,7 @@
 
 #![forbid(unsafe_code)]
 
-use longan_plugin::{Measure, Needs, Window};
+use longan_plugin::{Measure, Needs, Quantity, Window};
 
 /// The rank 2 tensor's eigenvalues by magnitude, times two: the larger and the smaller, negative where they differ in sign.
 fn eigenvalues(window: &Window<'_>) -> (f64, f64) {
@@ -24,6 +24,10 @@ impl Measure for ShapeIndex {
 
     fn definition(&self) -> String {
         "ratio of the rank 2 tensor's eigenvalues, smaller over larger: (ψ_0 − |ψ_2|)/(ψ_0 + |ψ_2|)".to_owned()
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity::Ratio
     }
 
     fn unit(&self) -> &str {
@@ -54,6 +58,10 @@ impl Measure for Quotient {
 
     fn definition(&self) -> String {
         "eigenvalue quotient of the rank 2 tensor, larger over smaller, as evq".to_owned()
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity::Ratio
     }
 
     fn unit(&self) -> &str {

@@ -1,12 +1,43 @@
-//! What belongs to a variable's dimensions: latitude, longitude, time and other coordinates.
+//! The coordinates that belong to a variable's dimensions: latitude, longitude, time and other coordinates.
 //!
 //! A coordinate is known by its units, else by its `standard_name`, else by its `axis`, else by its name, and may be
-//! in the variable's group or any that this one is in. Its values are left to others.
+//! in the variable's group or any that this one is in. The values of coordinates are left to others.
 
-use crate::Error;
 use crate::dataset::{Dataset, Dimension, Kind, Variable};
+use crate::error::{ErrorKind, Reason};
 
-/// What a coordinate says of places on the sphere, or of time.
+/// Coordinates of the sphere that are not read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Problem {
+    #[error(
+        "variable '{variable}' is on a curvilinear grid, whose coordinate '{coordinate}' has two dimensions, but only rectilinear ones are read; regrid it first, such as with cdo remapbil,global_1"
+    )]
+    Curvilinear { variable: String, coordinate: String },
+    #[error(
+        "variable '{variable}' is on an unstructured grid, whose latitudes and longitudes both run along '{dimension}', but only rectilinear ones are read; regrid it first, such as with cdo remapnn,global_1"
+    )]
+    Unstructured { variable: String, dimension: String },
+    #[error(
+        "coordinate '{coordinate}' is a {found}, not a latitude or longitude; regrid the field first, such as with cdo remapbil,global_1"
+    )]
+    OtherAxis { coordinate: String, found: String },
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', but degrees are needed; multiply it by 180/pi and set its units to degrees, such as with ncap2"
+    )]
+    CoordinateRadians { coordinate: String, units: String },
+    #[error(
+        "coordinate '{coordinate}' is in '{units}', not degrees; bring the field to a grid of latitude and longitude first, such as with gdalwarp -t_srs EPSG:4326"
+    )]
+    CoordinateUnits { coordinate: String, units: String },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Unsupported
+    }
+}
+
+/// The axis of places on the sphere, or of time, along which a coordinate runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axis {
     Latitude,
@@ -113,20 +144,20 @@ impl Horizontal {
     /// # Errors
     /// Where it has, but not in a way that can be read: two-dimensional coordinates, one dimension for both, or other
     /// units than degrees.
-    pub(crate) fn of(dataset: &dyn Dataset, variable: &Variable) -> Result<Option<Self>, Error> {
+    pub(crate) fn of(dataset: &dyn Dataset, variable: &Variable) -> Result<Option<Self>, Problem> {
         let latitude = axis_of(dataset, variable, Axis::Latitude);
         let longitude = axis_of(dataset, variable, Axis::Longitude);
         let sure = |axis: &Option<Found>| axis.as_ref().is_some_and(|found| found.evidence <= Evidence::StandardName);
         if !(sure(&latitude) && sure(&longitude))
             && let Some(coordinate) = two_dimensional(dataset, variable)
         {
-            return Err(Error::Curvilinear { variable: variable.path(), coordinate: coordinate.path() });
+            return Err(Problem::Curvilinear { variable: variable.path(), coordinate: coordinate.path() });
         }
         let (Some(latitude), Some(longitude)) = (latitude, longitude) else { return Ok(None) };
         let both = [latitude.variable, longitude.variable].map(|place| &dataset.variables()[place]);
         if latitude.dimension == longitude.dimension {
             let dimension = variable.dimensions[latitude.dimension].name.clone();
-            return Err(Error::Unstructured { variable: variable.path(), dimension });
+            return Err(Problem::Unstructured { variable: variable.path(), dimension });
         }
         for coordinate in both {
             check_degrees(coordinate)?;
@@ -186,10 +217,10 @@ fn two_dimensional<'d>(dataset: &'d dyn Dataset, variable: &Variable) -> Option<
 }
 
 /// Fails where a coordinate of the sphere is in other units than degrees.
-fn check_degrees(coordinate: &Variable) -> Result<(), Error> {
+fn check_degrees(coordinate: &Variable) -> Result<(), Problem> {
     let standard_name = coordinate.text("standard_name");
     if let Some(found) = standard_name.filter(|name| !["latitude", "longitude"].contains(name)) {
-        return Err(Error::OtherAxis { coordinate: coordinate.path(), found: found.escape_debug().to_string() });
+        return Err(Problem::OtherAxis { coordinate: coordinate.path(), found: found.escape_debug().to_string() });
     }
     let Some(units) = coordinate.text("units").map(str::trim) else { return Ok(()) };
     let plain = ["degrees", "degree", "deg", "\u{b0}", ""].iter().any(|u| u.eq_ignore_ascii_case(units));
@@ -198,9 +229,9 @@ fn check_degrees(coordinate: &Variable) -> Result<(), Error> {
     }
     let (coordinate, units) = (coordinate.path(), units.escape_debug().to_string());
     if units.to_ascii_lowercase().starts_with("rad") {
-        Err(Error::CoordinateRadians { coordinate, units })
+        Err(Problem::CoordinateRadians { coordinate, units })
     } else {
-        Err(Error::CoordinateUnits { coordinate, units })
+        Err(Problem::CoordinateUnits { coordinate, units })
     }
 }
 

@@ -1,12 +1,13 @@
-//! What is said of a variable to people who ask what a file holds.
+//! The description of a variable: its dimensions, name, unit and attributes.
 //!
-//! Of what grid it is, is left to the adapters.
+//! The description of its grid is left to the adapters.
 
 use super::select::Labels;
+use crate::card::{Card, CardValue};
 use crate::dataset::{Attribute, Dataset, Dimension, Variable};
-use crate::{
-    Card, CardValue, DimensionDescription, Error, FieldDescription, GridDescription, TableDescription, TablePlace,
-};
+use crate::describe::{DimensionDescription, FieldDescription, GridDescription, TableDescription, TablePlace};
+use crate::error::Error;
+use crate::quantity::StatedQuantity;
 
 /// A variable on a grid, which takes the dimensions at the places `sphere`: its other dimensions, name and unit.
 ///
@@ -36,12 +37,13 @@ pub(crate) fn describe(
             name: variable.name.clone(),
             unit: variable.text("units").map(str::to_owned),
             long_name: variable.text("long_name").map(str::to_owned),
+            quantity: StatedQuantity::of(variable),
         }],
         cards: cards(dataset, &variable.group),
     })
 }
 
-/// What a file says of a group: its own attributes and, where it does not have the same, those of the whole.
+/// The attributes of a group and, where it does not have the same, those of the whole file.
 fn cards(dataset: &dyn Dataset, group: &str) -> Vec<Card> {
     let mut cards: Vec<Card> = Vec::new();
     for (name, attribute) in dataset.group_attributes(group).iter().chain(dataset.group_attributes("/")) {

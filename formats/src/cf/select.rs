@@ -8,11 +8,68 @@ use std::ops::Range;
 use super::coordinates::{Axis, coordinate_of, scalar_time};
 use super::time::TimeUnits;
 use super::unpack::values;
-use crate::Error;
-use crate::adapter::{At, Place};
 use crate::dataset::{Array, Dataset, Dimension, Kind, Variable};
+use crate::error::{Ask, Error, ErrorKind, Reason};
 use crate::names::is_alike;
+use crate::request::{At, Place};
 use longan_grid::Time;
+
+/// Problems with a choice of places along dimensions.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Problem {
+    #[error(
+        "dimension '{dimension}' of variable '{variable}' has length 0, so there is nothing to read; check how the file was made"
+    )]
+    EmptyDimension { variable: String, dimension: String },
+    #[error("variable '{variable}' has no dimension '{dimension}' to choose along; its dimensions are {dimensions}")]
+    NoSuchDimension { variable: String, dimension: String, dimensions: String },
+    #[error("dimension '{dimension}' runs over the sphere, all of which is read; leave it out of the selection")]
+    SphereDimension { dimension: String },
+    #[error("dimension '{dimension}' is chosen along twice; leave one choice out")]
+    SelectedTwice { dimension: String },
+    #[error("there is no {dimension} = {place}; the values are {values}")]
+    NoSuchPlace { dimension: String, place: String, values: String },
+    #[error("{dimension} = {place} is met {count} times; choose one by its number, such as #{first}")]
+    SeveralPlaces { dimension: String, place: String, count: usize, first: usize },
+    #[error("there is no {dimension} = #{index}; they are numbered from #0 to #{last}")]
+    IndexRange { dimension: String, index: usize, last: usize },
+    #[error("variable '{variable}' has several values along '{dimension}': {values}; choose one")]
+    DimensionLeft { variable: String, dimension: String, values: String },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::EmptyDimension { .. } => ErrorKind::NoValues,
+            Problem::NoSuchDimension { .. } | Problem::NoSuchPlace { .. } => ErrorKind::Unknown,
+            Problem::SphereDimension { .. } => ErrorKind::NotApplicable,
+            Problem::SelectedTwice { .. } => ErrorKind::InvalidInput,
+            Problem::SeveralPlaces { .. } | Problem::DimensionLeft { .. } => ErrorKind::Ambiguous,
+            Problem::IndexRange { .. } => ErrorKind::OutOfRange,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        let (dimension, place) = match self {
+            Problem::EmptyDimension { .. } => return None,
+            Problem::NoSuchDimension { .. } => (None, None),
+            Problem::SeveralPlaces { dimension, first, .. } => (Some(dimension), Some(format!("#{first}"))),
+            Problem::SphereDimension { dimension }
+            | Problem::SelectedTwice { dimension }
+            | Problem::NoSuchPlace { dimension, .. }
+            | Problem::IndexRange { dimension, .. }
+            | Problem::DimensionLeft { dimension, .. } => (Some(dimension), None),
+        };
+        Some(Ask::Place { dimension: dimension.cloned(), place })
+    }
+
+    fn found(&self) -> Option<String> {
+        match self {
+            Problem::EmptyDimension { dimension, .. } => Some(format!("empty along '{dimension}'")),
+            _ => None,
+        }
+    }
+}
 
 /// A number names a coordinate value within this part of it, so that 0.1 finds 0.1 in single precision.
 const VALUE_TOLERANCE: f64 = 1e-6;
@@ -22,9 +79,9 @@ const LISTED: usize = 12;
 const LISTED_FIRST: usize = 6;
 const LISTED_LAST: usize = 3;
 
-/// What the places along a dimension are called.
+/// The names of the places along a dimension.
 pub(crate) enum Labels {
-    /// Nothing: there is no coordinate. How many they are.
+    /// No names, since there is no coordinate; the number of places.
     None(usize),
     /// Numbers, and their unit.
     Numbers(Vec<f64>, Option<String>),
@@ -148,7 +205,7 @@ fn number(value: f64) -> String {
     if f64::from(single) == value { single.to_string() } else { value.to_string() }
 }
 
-/// What is chosen of a variable.
+/// The places that are chosen of a variable.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     /// A place along each dimension; nothing along those of the sphere.
@@ -186,16 +243,16 @@ impl Chosen {
 pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize], at: &[At]) -> Result<Chosen, Error> {
     let dimensions = &variable.dimensions;
     if let Some(empty) = dimensions.iter().find(|dimension| dimension.len == 0) {
-        return Err(Error::EmptyDimension { variable: variable.path(), dimension: empty.name.clone() });
+        return Err(Problem::EmptyDimension { variable: variable.path(), dimension: empty.name.clone() }.into());
     }
     let mut asked: Vec<Option<&Place>> = vec![None; dimensions.len()];
     for At { dimension: name, place } in at {
         let number = dimension_named(dataset, variable, name)?;
         if sphere.contains(&number) {
-            return Err(Error::SphereDimension { dimension: name.escape_debug().to_string() });
+            return Err(Problem::SphereDimension { dimension: name.escape_debug().to_string() }.into());
         }
         if asked[number].replace(place).is_some() {
-            return Err(Error::SelectedTwice { dimension: name.escape_debug().to_string() });
+            return Err(Problem::SelectedTwice { dimension: name.escape_debug().to_string() }.into());
         }
     }
     let mut chosen = Chosen { places: vec![None; dimensions.len()], series: None, times: Vec::new() };
@@ -206,24 +263,25 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
         let places = match asked[number] {
             Some(&Place::Index(index)) if index < dimension.len => vec![index],
             Some(&Place::Index(index)) => {
-                return Err(Error::IndexRange { dimension: name(), index, last: dimension.len - 1 });
+                return Err(Problem::IndexRange { dimension: name(), index, last: dimension.len - 1 }.into());
             }
             Some(Place::Value(text)) => {
                 let places = labels.matching(text);
                 if places.is_empty() {
                     let (dimension, place, values) = (name(), text.escape_debug().to_string(), labels.listed());
-                    return Err(Error::NoSuchPlace { dimension, place, values });
+                    return Err(Problem::NoSuchPlace { dimension, place, values }.into());
                 }
                 if places.len() > 1 && !is_time {
                     let (dimension, place) = (name(), text.escape_debug().to_string());
-                    return Err(Error::SeveralPlaces { dimension, place, count: places.len(), first: places[0] });
+                    let (count, first) = (places.len(), places[0]);
+                    return Err(Problem::SeveralPlaces { dimension, place, count, first }.into());
                 }
                 places
             }
             None if is_time || dimension.len == 1 => (0..dimension.len).collect(),
             None => {
                 let (variable, dimension) = (variable.path(), name());
-                return Err(Error::DimensionLeft { variable, dimension, values: labels.listed() });
+                return Err(Problem::DimensionLeft { variable, dimension, values: labels.listed() }.into());
             }
         };
         chosen.places[number] = Some(places[0]);
@@ -243,7 +301,7 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
 }
 
 /// The dimension of a variable that has this name, or whose coordinate has it.
-fn dimension_named(dataset: &dyn Dataset, variable: &Variable, name: &str) -> Result<usize, Error> {
+fn dimension_named(dataset: &dyn Dataset, variable: &Variable, name: &str) -> Result<usize, Problem> {
     let dimensions = &variable.dimensions;
     let position = |is: &dyn Fn(&Dimension) -> bool| dimensions.iter().position(is);
     let coordinate = |d: &Dimension| coordinate_of(dataset, variable, d).map(|v| v.name.as_str());
@@ -251,7 +309,7 @@ fn dimension_named(dataset: &dyn Dataset, variable: &Variable, name: &str) -> Re
         .or_else(|| position(&|d| coordinate(d) == Some(name)))
         .or_else(|| position(&|d| is_alike(&d.name, name)))
         .or_else(|| position(&|d| coordinate(d).is_some_and(|c| is_alike(c, name))));
-    named.ok_or_else(|| Error::NoSuchDimension {
+    named.ok_or_else(|| Problem::NoSuchDimension {
         variable: variable.path(),
         dimension: name.escape_debug().to_string(),
         dimensions: shape(variable),

@@ -151,7 +151,7 @@ impl fmt::Display for Moment {
     }
 }
 
-/// What numbers of a time coordinate are counted in.
+/// The unit in which numbers of a time coordinate are counted.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimeUnits {
     calendar: Calendar,

@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
-use crate::Error;
-use crate::dataset::{Array, Attribute, Dataset, Kind, Variable};
+use crate::dataset::{Array, Attribute, Dataset, Kind, Problem, Variable};
+use crate::error::Error;
 
-/// What libnetcdf puts where real numbers were never written.
+/// The value that libnetcdf puts where real numbers were never written.
 const DEFAULT_REAL: f64 = 9.969_209_968_386_869e36;
 
 /// The part of a variable within these ranges of indices, unpacked, NaN where missing.
@@ -25,15 +25,15 @@ pub(crate) fn values(dataset: &dyn Dataset, variable: &Variable, ranges: &[Range
             Ok(values)
         }
         Array::Whole(values) => Ok(values.into_iter().map(|v| packing.unpack_whole(v)).collect()),
-        Array::Text(_) => Err(no_numbers(variable, "text")),
+        Array::Text(_) => Err(no_numbers(variable, "text").into()),
     }
 }
 
-fn no_numbers(variable: &Variable, found: &'static str) -> Error {
-    Error::VariableKind { variable: variable.path(), found }
+fn no_numbers(variable: &Variable, found: &'static str) -> Problem {
+    Problem::VariableKind { variable: variable.path(), found }
 }
 
-/// How a variable's values are stored.
+/// The way in which a variable's values are stored.
 struct Packing {
     scale: Option<f64>,
     offset: Option<f64>,
@@ -75,7 +75,7 @@ impl Sign {
 }
 
 impl Packing {
-    fn of(variable: &Variable) -> Result<Self, Error> {
+    fn of(variable: &Variable) -> Result<Self, Problem> {
         let single = variable.kind == Kind::Real32;
         let whole = match variable.kind {
             Kind::Real32 | Kind::Real64 => false,
@@ -171,7 +171,7 @@ fn as_stored(value: f64, single: bool) -> f64 {
     if single { f64::from(value as f32) } else { value }
 }
 
-/// What libnetcdf puts where whole numbers were never written.
+/// The value that libnetcdf puts where whole numbers were never written.
 fn default_whole(kind: Kind) -> Option<i64> {
     let Kind::Integer { bits, signed } = kind else { return None };
     match (bits, signed) {
@@ -185,7 +185,7 @@ fn default_whole(kind: Kind) -> Option<i64> {
 }
 
 /// An attribute that is one finite number.
-fn number(variable: &Variable, name: &'static str) -> Result<Option<f64>, Error> {
+fn number(variable: &Variable, name: &'static str) -> Result<Option<f64>, Problem> {
     let number = match variable.attribute(name) {
         None => return Ok(None),
         Some(Attribute::Real(numbers)) if numbers.len() == 1 => numbers[0],
@@ -199,7 +199,7 @@ fn number(variable: &Variable, name: &'static str) -> Result<Option<f64>, Error>
     }
 }
 
-fn wrong(variable: &Variable, attribute: &'static str, found: &Attribute, expected: &'static str) -> Error {
+fn wrong(variable: &Variable, attribute: &'static str, found: &Attribute, expected: &'static str) -> Problem {
     let found = match found {
         Attribute::Text(text) => format!("the text '{}'", text.escape_debug()),
         Attribute::Real(numbers) if numbers.len() == 1 => numbers[0].to_string(),
@@ -208,7 +208,7 @@ fn wrong(variable: &Variable, attribute: &'static str, found: &Attribute, expect
         Attribute::Whole(numbers) => format!("{} numbers", numbers.len()),
         Attribute::Json(_) => "neither text nor numbers".to_owned(),
     };
-    Error::AttributeValue { variable: variable.path(), attribute, found, expected }
+    Problem::AttributeValue { variable: variable.path(), attribute, found, expected }
 }
 
 #[cfg(test)]
@@ -320,6 +320,6 @@ mod tests {
             let error = Packing::of(&variable(I16, &[(name, attribute)])).err().unwrap();
             assert!(error.to_string().starts_with(&format!("variable 'v' has {name} = ")), "{error}");
         }
-        assert!(matches!(Packing::of(&variable(Kind::Text, &[])), Err(Error::VariableKind { found: "text", .. })));
+        assert!(matches!(Packing::of(&variable(Kind::Text, &[])), Err(Problem::VariableKind { found: "text", .. })));
     }
 }

@@ -1,12 +1,13 @@
-//! How the cells of a variable are numbered, from any of the ways in which files say it.
+//! The numbering of a variable's cells, from any of the ways in which files say it.
 //!
 //! In the order in which they are looked for: the grid mapping that the variable names; the attributes that xdggs puts
 //! on an index coordinate; the group attribute of the Zarr convention `dggs`; and, for variables that name no grid
-//! mapping or one that is not there, a HEALPix grid mapping in scope, if the variable has a dimension for cells. What
-//! the numbers are is left to [`super::read`].
+//! mapping or one that is not there, a HEALPix grid mapping in scope, if the variable has a dimension for cells. The
+//! numbers themselves are left to [`super::read`].
 
-use crate::dataset::{Attribute, Dataset, Kind, Variable};
-use crate::{Error, cf};
+use crate::cf;
+use crate::dataset::{self, Attribute, Dataset, Kind, Variable};
+use crate::error::{Error, ErrorKind, Reason};
 use longan_grid::{Healpix, Ordering};
 
 /// Names that dimensions of cells have in files without an index coordinate.
@@ -15,7 +16,22 @@ const CELL_DIMENSIONS: [&str; 8] = ["cell", "cells", "value", "values", "healpix
 /// The number of pixels is 12 · 4^level, so that level 29 is the last that 64 bits hold.
 const LEVEL_MAX: i64 = 29;
 
-/// How the cells of a variable are numbered, as far as the file says it.
+/// A HEALPix field about which the file leaves something unsaid.
+#[derive(Debug, thiserror::Error)]
+#[error("variable '{variable}' is on a HEALPix grid, but nothing says {unknown}; add it to its grid mapping")]
+pub(super) struct Unsaid {
+    pub(super) variable: String,
+    /// The thing unsaid, and the attribute that would say it.
+    pub(super) unknown: &'static str,
+}
+
+impl Reason for Unsaid {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Incomplete
+    }
+}
+
+/// The numbering of a variable's cells, as far as the file says it.
 pub(super) struct Grid {
     /// The dimension of cells, as a place among the variable's.
     pub(super) dimension: usize,
@@ -24,7 +40,7 @@ pub(super) struct Grid {
     says: Says,
 }
 
-/// What the numbers of cells are.
+/// The kinds of numbers of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scheme {
     /// Of pixels of one grid.
@@ -35,10 +51,10 @@ pub(super) enum Scheme {
     Zuniq,
 }
 
-/// What attributes say of a grid.
+/// The words of attributes about a grid.
 #[derive(Clone, Default)]
 struct Says {
-    /// Whose attributes they are.
+    /// The variable or group that has the attributes.
     of: String,
     /// Nside or the level, by the name of the attribute that has it.
     nside: Option<(&'static str, Attribute)>,
@@ -49,7 +65,7 @@ struct Says {
 }
 
 impl Says {
-    /// What attributes say, if it is HEALPix that they speak of.
+    /// The words of attributes, if they are about HEALPix.
     fn of(of: &str, get: &dyn Fn(&str) -> Option<Attribute>) -> Option<Self> {
         let is = |name: &str| matches!(get(name), Some(Attribute::Text(text)) if text.eq_ignore_ascii_case("healpix"));
         let xdggs = is("grid_name") || is("name");
@@ -74,14 +90,14 @@ impl Says {
         Says::of(&variable.path(), &|name| variable.attribute(name).cloned())
     }
 
-    fn wrong(&self, (attribute, found): &(&'static str, Attribute), expected: &'static str) -> Error {
+    fn wrong(&self, (attribute, found): &(&'static str, Attribute), expected: &'static str) -> dataset::Problem {
         let found = match found {
             Attribute::Text(text) => format!("'{}'", text.escape_debug()),
             Attribute::Real(numbers) => format!("{numbers:?}"),
             Attribute::Whole(numbers) => format!("{numbers:?}"),
             Attribute::Json(value) => value.to_string(),
         };
-        Error::AttributeValue { variable: self.of.clone(), attribute, found, expected }
+        dataset::Problem::AttributeValue { variable: self.of.clone(), attribute, found, expected }
     }
 
     /// The grid, if a level or Nside is named.
@@ -93,11 +109,11 @@ impl Says {
         }
         let Some(nside) = &self.nside else { return Ok(None) };
         let number = whole(&nside.1).and_then(|number| Healpix::new(usize::try_from(number).ok()?).ok());
-        number.map(Some).ok_or_else(|| self.wrong(nside, "a whole number from 1 to 2^29"))
+        Ok(Some(number.ok_or_else(|| self.wrong(nside, "a whole number from 1 to 2^29"))?))
     }
 
     /// The name of the scheme in CF's words.
-    fn scheme(&self) -> Result<Option<&'static str>, Error> {
+    fn scheme(&self) -> Result<Option<&'static str>, dataset::Problem> {
         let Some(scheme) = &self.scheme else { return Ok(self.scheme_default) };
         let name = match &scheme.1 {
             Attribute::Text(text) => text.trim().to_ascii_lowercase(),
@@ -160,9 +176,9 @@ impl Grid {
     }
 
     /// The grid of a variable that is known to be HEALPix.
-    pub(super) fn of(dataset: &dyn Dataset, variable: &Variable) -> Result<Self, Error> {
+    pub(super) fn of(dataset: &dyn Dataset, variable: &Variable) -> Result<Self, Unsaid> {
         let unknown = "how pixels are numbered (indexing_scheme)";
-        Grid::find(dataset, variable).ok_or_else(|| Error::GridUnknown { variable: variable.path(), unknown })
+        Grid::find(dataset, variable).ok_or_else(|| Unsaid { variable: variable.path(), unknown })
     }
 
     /// The grid of a variable, along the dimension of this name if one is given. Where it is not `sure` that the
@@ -195,12 +211,12 @@ impl Grid {
         Some(Grid { dimension, index: index_of(dimension).map(|(index, _)| index), says })
     }
 
-    /// What the numbers of cells are.
+    /// The kind of the numbers of cells.
     ///
     /// # Errors
     /// Where the file does not say it, or says what cannot be.
     pub(super) fn scheme(&self, variable: &Variable) -> Result<Scheme, Error> {
-        let unknown = |unknown| Error::GridUnknown { variable: variable.path(), unknown };
+        let unknown = |unknown| Unsaid { variable: variable.path(), unknown };
         let scheme = self.says.scheme()?.ok_or_else(|| unknown("how pixels are numbered (indexing_scheme)"))?;
         let ordering = match scheme {
             "nuniq" => return Ok(Scheme::Nuniq),
@@ -239,7 +255,7 @@ fn index_along(dataset: &dyn Dataset, variable: &Variable, dimension: usize, say
     sure.map(|(place, _)| (place, true)).or_else(|| by_name().map(|(place, _)| (place, false)))
 }
 
-/// What the attribute `dggs` of a group, or of one around it, says; and the dimension of cells. The variable of numbers
+/// The words of the attribute `dggs` of a group, or of one around it, and the dimension of cells. The variable of numbers
 /// is named in brackets.
 fn convention(dataset: &dyn Dataset, group: &str) -> Option<(Says, Option<String>)> {
     let mut group = group;

@@ -1,20 +1,66 @@
 //! The values of a HEALPix field, step by step, brought to RING order.
 //!
-//! How cells are numbered is left to [`super::grid`], cells of several sizes to [`crate::multi_order`].
+//! The numbering of cells is left to [`super::grid`], cells of several sizes to [`crate::multi_order`].
 
 use std::rc::Rc;
 
 use rayon::prelude::*;
 
-use super::grid::{Grid, Scheme};
+use super::grid::{Grid, Scheme, Unsaid};
+use crate::adapter::{About, MapSeries, MemoryEstimate};
+use crate::cf;
 use crate::dataset::{Array, Attribute, Dataset, Variable};
-use crate::multi_order::{Cell, Problem, gather, place_of_uniq, place_of_zuniq};
-use crate::{About, Error, GridDescription, Indexing, Maps, Room, Selection, cf};
+use crate::describe::{GridDescription, Indexing};
+use crate::error::{Ask, Error, ErrorKind, Reason};
+use crate::multi_order::{self, Cell, finest, gather, place_of_uniq, place_of_zuniq};
+use crate::quantity::StatedQuantity;
+use crate::request::Selection;
 use longan_grid::accumulate::{Accumulator, CHUNK};
 use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Sphere, Time, UNSEEN, is_bad};
 
-/// Finds what is selected of a field.
-pub(super) fn open(dataset: &Rc<dyn Dataset>, variable: usize, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+/// Cells that do not make a map, or not at the Nside asked for.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error(
+        "variable '{variable}' has {found} values along '{dimension}', but Nside {nside} has {expected} pixels; add the coordinate healpix_index, which says which ones they are, or correct the grid mapping"
+    )]
+    Count { variable: String, dimension: String, found: usize, nside: usize, expected: usize },
+    #[error("'{index}' has {number} at place {place} (from 0), which is not {expected}; correct it")]
+    Number { index: String, number: i64, place: usize, expected: String },
+    #[error("'{index}' should number pixels but holds {found}; store whole numbers")]
+    Kind { index: String, found: &'static str },
+    #[error("'{index}' has the cells {first} and {second} (UNIQ numbers), which overlap; remove one of them")]
+    Overlap { index: String, first: u64, second: u64 },
+    #[error("'{index}' names pixel {number} more than once; remove the duplicates")]
+    Twice { index: String, number: i64 },
+    #[error("the cells of '{index}' reach Nside {finest}, beyond {limit}; choose the resolution to bring them to")]
+    TooFine { index: String, finest: usize, limit: usize },
+    #[error(
+        "variable '{variable}' has Nside {nside}, so it cannot be read at Nside {asked}; leave the Nside out, or degrade the field first (for example with healpy.ud_grade)"
+    )]
+    OneResolution { variable: String, nside: usize, asked: usize },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::TooFine { .. } => ErrorKind::OutOfRange,
+            Problem::OneResolution { .. } => ErrorKind::NotApplicable,
+            _ => ErrorKind::Invalid,
+        }
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        matches!(self, Problem::TooFine { .. } | Problem::OneResolution { .. }).then_some(Ask::Nside)
+    }
+}
+
+/// Finds the selected places of a field.
+pub(super) fn open(
+    dataset: &Rc<dyn Dataset>,
+    variable: usize,
+    selection: &Selection,
+) -> Result<Box<dyn MapSeries>, Error> {
     let field = &dataset.variables()[variable];
     let grid = Grid::of(&**dataset, field)?;
     let chosen = cf::select(&**dataset, field, &[grid.dimension], &selection.at)?;
@@ -22,7 +68,7 @@ pub(super) fn open(dataset: &Rc<dyn Dataset>, variable: usize, selection: &Selec
     if let (Scheme::Pixels(healpix, _), Some(asked)) = (scheme, selection.nside)
         && asked != healpix.nside()
     {
-        return Err(Error::OneResolution { variable: field.path(), nside: healpix.nside(), asked });
+        return Err(Problem::OneResolution { variable: field.path(), nside: healpix.nside(), asked }.into());
     }
     let cells = cells(&**dataset, field, &grid, scheme)?;
     Ok(Box::new(Field { dataset: dataset.clone(), variable, chosen, cells, nside: selection.nside }))
@@ -33,10 +79,7 @@ pub(super) fn describe(dataset: &dyn Dataset, field: &Variable, grid: &Grid) -> 
     let (nside, ordering, indexing) = match cells(dataset, field, grid, grid.scheme(field)?)? {
         Cells::All(healpix, ordering) => (healpix.nside(), ordering, Indexing::Implicit),
         Cells::Some(healpix, ordering, _) => (healpix.nside(), ordering, Indexing::Explicit),
-        Cells::Sizes(places, _) => {
-            let finest = places.iter().map(|&place| Cell { place, value: 0.0 }.order()).max();
-            (1 << finest.unwrap_or(0), Ordering::Nested, Indexing::MultiOrder)
-        }
+        Cells::Sizes(places, _) => (finest(places.iter().copied()), Ordering::Nested, Indexing::MultiOrder),
     };
     let pixels = field.dimensions[grid.dimension].len;
     let coordinates = coordinates(dataset);
@@ -52,7 +95,7 @@ fn coordinates(dataset: &dyn Dataset) -> Option<CoordinateSystem> {
     }
 }
 
-/// What each cell of a field is.
+/// The pixels of a field's cells.
 enum Cells {
     /// All pixels, one after the other.
     All(Healpix, Ordering),
@@ -71,7 +114,7 @@ struct Field {
     nside: Option<usize>,
 }
 
-impl Maps for Field {
+impl MapSeries for Field {
     fn times(&self) -> &[Time] {
         self.chosen.times()
     }
@@ -81,16 +124,16 @@ impl Maps for Field {
         let (name, unit) = (variable.name.clone(), variable.text("units").map(str::to_owned));
         let coordinates = coordinates(&*self.dataset);
         let sphere = if coordinates.is_some() { Sphere::Sky } else { Sphere::Earth };
-        About { name, unit, coordinates, sphere }
+        About { name, unit, coordinates, sphere, quantity: StatedQuantity::of(variable) }
     }
 
-    fn room(&self) -> Option<Room> {
+    fn memory(&self) -> Option<MemoryEstimate> {
         let (grid, cells) = match &self.cells {
             Cells::All(grid, _) => (*grid, grid.pixels()),
             Cells::Some(grid, _, places) => (*grid, 2 * places.len()),
             Cells::Sizes(places, _) => (Healpix::new(self.nside?).ok()?, 4 * places.len()),
         };
-        Some(Room::of(grid, cells.saturating_mul(size_of::<f64>())))
+        Some(MemoryEstimate::of(grid, cells.saturating_mul(size_of::<f64>())))
     }
 
     fn read(&mut self, step: usize) -> Result<Map, Error> {
@@ -127,9 +170,13 @@ impl Maps for Field {
                 let cells = places.iter().zip(&values).map(|(&place, &value)| Cell { place, value }).collect();
                 let index = || index.clone();
                 let canvas = gather(cells, self.nside).map_err(|problem| match problem {
-                    Problem::Overlap { first, second } => Error::CellOverlap { index: index(), first, second },
-                    Problem::TooFine { finest, limit } => Error::CellsFine { index: index(), finest, limit },
-                    Problem::Other(error) => error,
+                    multi_order::Problem::Overlap { first, second } => {
+                        Problem::Overlap { index: index(), first, second }.into()
+                    }
+                    multi_order::Problem::TooFine { finest, limit } => {
+                        Problem::TooFine { index: index(), finest, limit }.into()
+                    }
+                    multi_order::Problem::Other(error) => error,
                 })?;
                 (canvas, Ordering::Nested)
             }
@@ -143,7 +190,7 @@ impl Maps for Field {
     }
 }
 
-/// What each cell of a field is.
+/// The pixels of a field's cells.
 fn cells(dataset: &dyn Dataset, field: &Variable, grid: &Grid, scheme: Scheme) -> Result<Cells, Error> {
     let dimension = &field.dimensions[grid.dimension];
     let index = grid.index.map(|place| &dataset.variables()[place]);
@@ -155,21 +202,21 @@ fn cells(dataset: &dyn Dataset, field: &Variable, grid: &Grid, scheme: Scheme) -
         Scheme::Zuniq => place_of_zuniq,
     };
     let unknown = "which cells they are (a coordinate with standard_name healpix_index)";
-    let numbers = numbers.ok_or_else(|| Error::GridUnknown { variable: field.path(), unknown })?;
+    let numbers = numbers.ok_or_else(|| Unsaid { variable: field.path(), unknown })?;
     debug_assert_eq!(numbers.len(), dimension.len);
     let number = |(i, &number): (usize, &i64)| {
         let expected = match scheme {
             Scheme::Nuniq => "4^(level + 1) + pixel for any level up to 29",
             _ => "(2 pixel + 1) 4^(29 - level) for any level up to 29",
         };
-        let wrong = || Error::CellNumber { index: path(), number, place: i, expected: expected.to_owned() };
+        let wrong = || Problem::Number { index: path(), number, place: i, expected: expected.to_owned() };
         place(number.into()).ok_or_else(wrong)
     };
-    let places = numbers.iter().enumerate().map(number).collect::<Result<_, Error>>()?;
+    let places = numbers.iter().enumerate().map(number).collect::<Result<_, Problem>>()?;
     Ok(Cells::Sizes(places, path()))
 }
 
-/// What each cell of a field on one grid is.
+/// The pixels of the cells of a field on one grid.
 fn pixels(
     field: &Variable,
     grid: &Grid,
@@ -182,8 +229,8 @@ fn pixels(
     let Some(numbers) = numbers.filter(|numbers| !all || (0..).zip(numbers).any(|(i, &number)| number != i)) else {
         let (variable, dimension, found) = (field.path(), dimension.name.clone(), dimension.len);
         let (nside, expected) = (healpix.nside(), healpix.pixels());
-        let count = Error::CellCount { variable, dimension, found, nside, expected };
-        return if all { Ok(Cells::All(healpix, ordering)) } else { Err(count) };
+        let count = Problem::Count { variable, dimension, found, nside, expected };
+        return if all { Ok(Cells::All(healpix, ordering)) } else { Err(count.into()) };
     };
     let layer = match ordering {
         Ordering::Ring => None,
@@ -193,21 +240,21 @@ fn pixels(
         Ok(pixel) if pixel < healpix.pixels() as u64 => Ok(layer.map_or(pixel, |layer| layer.to_ring(pixel))),
         _ => {
             let expected = format!("a pixel of Nside {}, 0 to {}", healpix.nside(), healpix.pixels() - 1);
-            Err(Error::CellNumber { index: index(), number, place: i, expected })
+            Err(Problem::Number { index: index(), number, place: i, expected })
         }
     };
     let places = numbers.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
     let mut sorted = numbers;
     sorted.par_sort_unstable();
     if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Error::CellTwice { index: index(), number: twice[0] });
+        return Err(Problem::Twice { index: index(), number: twice[0] }.into());
     }
     Ok(Cells::Some(healpix, ordering, places))
 }
 
 /// The numbers of cells.
 fn numbers(dataset: &dyn Dataset, index: &Variable) -> Result<Vec<i64>, Error> {
-    let wrong = |found| Error::CellKind { index: index.path(), found };
+    let wrong = |found| Problem::Kind { index: index.path(), found }.into();
     let whole: Vec<_> = index.dimensions.iter().map(|dimension| 0..dimension.len).collect();
     match dataset.read(index, &whole)? {
         Array::Whole(numbers) => Ok(numbers),

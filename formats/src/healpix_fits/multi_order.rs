@@ -1,12 +1,13 @@
 //! Multi-order maps: columns of UNIQ numbers and values.
 //!
-//! What cells of several sizes make of a grid is left to [`crate::multi_order`].
+//! The way from cells of several sizes to one grid is left to [`crate::multi_order`].
 
-use super::read::{read_integers, read_values};
+use super::problem::Problem;
 use super::table::{Column, Table};
-use crate::Error;
+use super::values::{read_integers, read_values};
 use crate::cfitsio::FitsReader;
-use crate::multi_order::{Cell, Problem, gather, place_of_uniq};
+use crate::error::Error;
+use crate::multi_order::{self, Cell, gather, place_of_uniq};
 use longan_grid::accumulate::{Accumulator, CHUNK};
 
 /// Calls `each` with the place of every cell in chunks, in the table's order, and the number of the first of them.
@@ -24,7 +25,7 @@ fn for_places(
         places.clear();
         for (i, &uniq) in (start..).zip(&uniqs) {
             let row = i / index.repeat + 1;
-            places.push(place_of_uniq(uniq).ok_or(Error::Uniq { hdu: table.hdu, uniq, row })?);
+            places.push(place_of_uniq(uniq).ok_or(Problem::Uniq { hdu: table.hdu, uniq, row })?);
         }
         each(fits, start, &places)?;
     }
@@ -33,13 +34,12 @@ fn for_places(
 
 /// Nside of the finest cells.
 pub(super) fn finest(fits: &mut FitsReader, table: &Table, index: &Column) -> Result<usize, Error> {
-    let mut order = 0;
+    let mut nside = 1;
     for_places(fits, table, index, |_, _, places| {
-        let finest = places.iter().map(|&place| Cell { place, value: 0.0 }.order()).max();
-        order = order.max(finest.unwrap_or(0));
+        nside = nside.max(multi_order::finest(places.iter().copied()));
         Ok(())
     })?;
-    Ok(1 << order)
+    Ok(nside)
 }
 
 /// Reads a column at the resolution asked for, else at that of the finest cells.
@@ -52,13 +52,8 @@ pub(super) fn read(
 ) -> Result<Accumulator, Error> {
     let hdu = table.hdu;
     if table.run(column, index, 0)? != 1 {
-        return Err(Error::Run {
-            hdu,
-            column: column.name.clone(),
-            values: column.repeat,
-            indices: index.repeat,
-            grain: 0,
-        });
+        let (values, indices) = (column.repeat, index.repeat);
+        return Err(Problem::Run { hdu, column: column.name.clone(), values, indices, grain: 0 }.into());
     }
     let mut cells = Vec::with_capacity(table.rows * index.repeat);
     let mut values = Vec::new();
@@ -69,8 +64,8 @@ pub(super) fn read(
         Ok(())
     })?;
     gather(cells, nside).map_err(|problem| match problem {
-        Problem::Overlap { first, second } => Error::Overlap { hdu, first, second },
-        Problem::TooFine { finest, limit } => Error::TooFine { hdu, finest, limit },
-        Problem::Other(error) => error,
+        multi_order::Problem::Overlap { first, second } => Problem::Overlap { hdu, first, second }.into(),
+        multi_order::Problem::TooFine { finest, limit } => Problem::TooFine { hdu, finest, limit }.into(),
+        multi_order::Problem::Other(error) => error,
     })
 }

@@ -1,17 +1,18 @@
-//! Which HDUs a FITS file has, and which of them are HEALPix tables.
+//! The HDUs of a FITS file, and which of them are HEALPix tables.
 //!
-//! What a HEALPix table says of itself is left to [`super::table`].
+//! The header of a HEALPix table is left to [`super::table`].
 
+use super::problem::Problem;
 use super::table::{self, Likeness};
-use crate::Error;
-use crate::cfitsio::{FitsReader, HduKind};
+use crate::cfitsio::{Extent, FitsReader, HduKind};
+use crate::error::Error;
 
 /// One HDU at a glance.
 struct Hdu {
     number: usize,
     kind: HduKind,
     likeness: Likeness,
-    /// What it is, in words.
+    /// A description in words.
     summary: String,
 }
 
@@ -31,8 +32,8 @@ pub(super) fn choose(fits: &mut FitsReader, asked: Option<usize>) -> Result<usiz
     };
     match hdus.iter().find(|h| h.number == number) {
         Some(hdu) if hdu.kind == HduKind::Table => Ok(number),
-        Some(hdu) => Err(Error::NotATable { hdu: number, found: hdu.summary.clone(), tables: tables() }),
-        None => Err(damage.unwrap_or_else(|| Error::NoSuchHdu { hdu: number, tables: tables() })),
+        Some(hdu) => Err(Problem::NotATable { hdu: number, found: hdu.summary.clone(), tables: tables() }.into()),
+        None => Err(damage.unwrap_or_else(|| Problem::NoSuchHdu { hdu: number, tables: tables() }.into())),
     }
 }
 
@@ -48,7 +49,7 @@ pub(super) fn healpix_tables(fits: &mut FitsReader) -> Result<Vec<usize>, Error>
         }
     }
     let found: Vec<_> = hdus.iter().map(|h| format!("HDU {} is {}", h.number, h.summary)).collect();
-    Err(damage.unwrap_or_else(|| Error::NoHealpix { found: found.join(", ") }))
+    Err(damage.unwrap_or_else(|| Problem::NoHealpix { found: found.join(", ") }.into()))
 }
 
 /// All HDUs up to the end of the file or the first that cannot be read, and why it cannot.
@@ -71,7 +72,7 @@ fn scan(fits: &mut FitsReader) -> Result<(Vec<Hdu>, Option<Error>), Error> {
     Ok((hdus, None))
 }
 
-fn glance(fits: &mut FitsReader, number: usize) -> Result<(Hdu, crate::cfitsio::Extent), Error> {
+fn glance(fits: &mut FitsReader, number: usize) -> Result<(Hdu, Extent), Error> {
     let kind = fits.go(number)?;
     let extent = fits.extent()?;
     let mut likeness = Likeness::None;

@@ -1,21 +1,23 @@
-//! What the header of a HEALPix table says: grid, ordering, indexing, columns.
+//! The header of a HEALPix table: grid, ordering, indexing, columns.
 //!
-//! Keywords are often missing, misspelt or wrong; what can be made good is, all else is an error. Values are left to
-//! [`super::read`].
+//! Keywords are often missing, misspelt or wrong; where the meaning is clear they are taken, else they are an error.
+//! Values are left to [`super::values`].
 
 use std::ffi::c_int;
 use std::ops::Range;
 
-use super::multi_order;
-use crate::cfitsio::FitsReader;
+use super::problem::Problem;
+use crate::cfitsio::{self, FitsReader};
+use crate::error::Error;
 use crate::names;
-use crate::{Card, CardValue, Error, Field, FieldDescription, GridDescription, Indexing, TableDescription, TablePlace};
+use crate::quantity::StatedQuantity;
+use crate::request::Field;
 use longan_grid::{CoordinateSystem, Healpix, Ordering};
 
 /// A HEALPix table.
 pub(super) struct Table {
     pub(super) hdu: usize,
-    name: Option<String>,
+    pub(super) name: Option<String>,
     pub(super) rows: usize,
     /// The data columns.
     pub(super) columns: Vec<Column>,
@@ -23,15 +25,15 @@ pub(super) struct Table {
     /// Whether it holds the planes of a cube, told apart by the index (Fermi's SPARSE).
     pub(super) sparse: bool,
     /// The grid, where there is a keyword for it.
-    grid: Option<Healpix>,
+    pub(super) grid: Option<Healpix>,
     pub(super) ordering: Ordering,
-    ordering_assumed: bool,
+    pub(super) ordering_assumed: bool,
     pub(super) coordinates: Option<CoordinateSystem>,
     /// The file's own marker for "no value here".
     pub(super) bad_data: Option<f64>,
 }
 
-/// How values are tied to pixels.
+/// The way in which values are tied to pixels.
 pub(super) enum Layout {
     /// By their place; with the first and last pixel that the header names.
     Implicit { named: Option<(usize, usize)> },
@@ -44,10 +46,11 @@ pub(super) enum Layout {
 /// A column of a table.
 #[derive(Clone)]
 pub(super) struct Column {
-    /// Its number in the file, from 1.
+    /// The column's number in the file, from 1.
     pub(super) number: c_int,
     pub(super) name: String,
     pub(super) unit: Option<String>,
+    pub(super) quantity: Option<StatedQuantity>,
     pub(super) kind: Kind,
     /// Values per row.
     pub(super) repeat: usize,
@@ -55,7 +58,7 @@ pub(super) struct Column {
     width: usize,
 }
 
-/// What a column holds.
+/// The kind of values in a column.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Real,
@@ -72,9 +75,9 @@ pub(super) enum Kind {
 /// How much a table looks like HEALPix.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Likeness {
-    /// It says so.
+    /// The table says so.
     Marked,
-    /// It does not say so, but has as many values as a map has pixels.
+    /// The table does not say so, but has as many values as a map has pixels.
     Shaped,
     /// Not at all.
     None,
@@ -119,7 +122,7 @@ impl Table {
             // What is read is sized by the columns, and cfitsio lets some absurd ones pass.
             if column.bytes() > width {
                 let (key, value) = (format!("TFORM{}", column.number), column.repeat);
-                return Err(bad_key(hdu, &key, value, "a number of values that fits into a row of NAXIS1 bytes"));
+                return Err(bad_key(hdu, &key, value, "a number of values that fits into a row of NAXIS1 bytes").into());
             }
         }
 
@@ -130,7 +133,7 @@ impl Table {
                 "RING" => (Ordering::Ring, false, false),
                 "NEST" | "NESTED" => (Ordering::Nested, false, false),
                 "NUNIQ" => (Ordering::Nested, false, true),
-                _ => return Err(bad_key(hdu, "ORDERING", ordering, "RING, NESTED or NUNIQ")),
+                _ => return Err(bad_key(hdu, "ORDERING", ordering, "RING, NESTED or NUNIQ").into()),
             },
         };
 
@@ -140,22 +143,24 @@ impl Table {
         let first_integer = || columns.iter().position(Column::is_index);
         let (index, uniq) = match (named(&[UNIQ]), scheme.as_deref()) {
             (Some(i), _) => (Some(i), true),
-            (None, _) if uniq => (Some(first_integer().ok_or(Error::NoIndexColumn { hdu })?), true),
+            (None, _) if uniq => (Some(first_integer().ok_or(Problem::NoIndexColumn { hdu })?), true),
             (None, Some("IMPLICIT")) => (None, false),
             (None, Some("EXPLICIT")) => {
                 let index = named(&INDEX_NAMES).or_else(first_integer);
-                (Some(index.ok_or(Error::NoIndexColumn { hdu })?), false)
+                (Some(index.ok_or(Problem::NoIndexColumn { hdu })?), false)
             }
             (None, Some("SPARSE")) => {
                 let index = named(&KEY_NAMES).or_else(|| named(&INDEX_NAMES)).or_else(first_integer);
-                (Some(index.ok_or(Error::NoIndexColumn { hdu })?), false)
+                (Some(index.ok_or(Problem::NoIndexColumn { hdu })?), false)
             }
             (None, None) => (named(&INDEX_NAMES), false),
-            (None, Some(scheme)) => return Err(bad_key(hdu, "INDXSCHM", scheme, "IMPLICIT, EXPLICIT or SPARSE")),
+            (None, Some(scheme)) => {
+                return Err(bad_key(hdu, "INDXSCHM", scheme, "IMPLICIT, EXPLICIT or SPARSE").into());
+            }
         };
         let index = index.map(|i| columns.remove(i));
         if rows == 0 || columns.is_empty() {
-            return Err(Error::Empty { hdu, rows, columns: columns.len() });
+            return Err(Problem::Empty { hdu, rows, columns: columns.len() }.into());
         }
 
         // A multi-order table has no Nside of its own, whatever its header says.
@@ -167,7 +172,9 @@ impl Table {
             |fits: &mut FitsReader, key| Ok::<_, Error>(whole(fits, hdu, key)?.and_then(|n| usize::try_from(n).ok()));
         let layout = match index {
             Some(index) if uniq => Layout::MultiOrder { index },
-            Some(index) if grid.is_none() => return Err(Error::NsideOfIndices { hdu, column: index.name }),
+            Some(index) if grid.is_none() => {
+                return Err(Problem::NsideOfIndices { hdu, column: index.name }.into());
+            }
             Some(index) => Layout::Explicit { index, grain: count(fits, "GRAIN")?.unwrap_or(0) },
             None => Layout::Implicit { named: count(fits, "FIRSTPIX")?.zip(count(fits, "LASTPIX")?) },
         };
@@ -186,56 +193,15 @@ impl Table {
         })
     }
 
-    /// What the table holds, for people.
-    pub(super) fn describe(&self, fits: &mut FitsReader) -> Result<TableDescription, Error> {
-        let column = self.columns.iter().find(|c| c.check(self.hdu).is_ok()).unwrap_or(&self.columns[0]);
-        let (indexing, nside, pixels) = match &self.layout {
-            Layout::Implicit { named } => {
-                let (grid, pixels) = self.implicit(column, *named)?;
-                (Indexing::Implicit, grid.nside(), pixels.len())
-            }
-            Layout::Explicit { index, grain } => {
-                let pixels = self.rows * index.repeat * self.run(column, index, *grain)?;
-                (Indexing::Explicit, self.grid.map_or(0, Healpix::nside), pixels)
-            }
-            Layout::MultiOrder { index } => {
-                let nside = multi_order::finest(fits, self, index)?;
-                (Indexing::MultiOrder, nside, self.rows * index.repeat)
-            }
-        };
-        let field = |c: &Column| FieldDescription { name: c.name.clone(), unit: c.unit.clone(), long_name: None };
-        Ok(TableDescription {
-            place: TablePlace::Hdu { hdu: self.hdu, name: self.name.clone() },
-            grid: GridDescription::Healpix {
-                nside,
-                ordering: self.ordering,
-                ordering_assumed: self.ordering_assumed,
-                coordinates: self.coordinates,
-                indexing,
-                pixels,
-            },
-            dimensions: Vec::new(),
-            fields: self.columns.iter().map(field).collect(),
-            cards: self.cards(fits)?,
-        })
-    }
-
-    /// The entries of the header.
-    fn cards(&self, fits: &mut FitsReader) -> Result<Vec<Card>, Error> {
-        fits.go(self.hdu)?;
-        let card = |(key, value): (String, String)| Card { key, value: card_value(&value), comment: String::new() };
-        Ok(fits.keys()?.into_iter().map(card).collect())
-    }
-
     /// The data column that a field is in, known to hold numbers.
-    pub(super) fn column(&self, field: Option<&Field>) -> Result<&Column, Error> {
+    pub(super) fn column(&self, field: Option<&Field>) -> Result<&Column, Problem> {
         let listed = |places: &mut dyn Iterator<Item = usize>| {
             places.map(|i| format!("{i} '{}'", self.columns[i].name)).collect::<Vec<_>>().join(", ")
         };
         let by_name = |name: &str| match names::meant(self.columns.iter().map(|c| &*c.name), name)[..] {
             [] => Ok(None),
             [only] => Ok(Some(&self.columns[only])),
-            ref several => Err(Error::SeveralFields {
+            ref several => Err(Problem::SeveralFields {
                 hdu: self.hdu,
                 field: name.escape_debug().to_string(),
                 fields: listed(&mut several.iter().copied()),
@@ -251,7 +217,7 @@ impl Table {
                 column => column,
             },
         };
-        let column = column.ok_or_else(|| Error::UnknownField {
+        let column = column.ok_or_else(|| Problem::UnknownField {
             hdu: self.hdu,
             field: field.map(Field::to_string).unwrap_or_default(),
             fields: listed(&mut (0..self.columns.len())),
@@ -261,8 +227,8 @@ impl Table {
     }
 
     /// The grid of an explicit table.
-    pub(super) fn explicit_grid(&self, index: &Column) -> Result<Healpix, Error> {
-        self.grid.ok_or_else(|| Error::NsideOfIndices { hdu: self.hdu, column: index.name.clone() })
+    pub(super) fn explicit_grid(&self, index: &Column) -> Result<Healpix, Problem> {
+        self.grid.ok_or_else(|| Problem::NsideOfIndices { hdu: self.hdu, column: index.name.clone() })
     }
 
     /// The grid of an implicit column, and which of its pixels the values are.
@@ -273,7 +239,7 @@ impl Table {
     ) -> Result<(Healpix, Range<usize>), Error> {
         let values = self.rows * column.repeat;
         let Some(grid) = self.grid else {
-            let grid = Healpix::with_pixels(values).ok_or(Error::NsideUnknown { hdu: self.hdu, pixels: values })?;
+            let grid = Healpix::with_pixels(values).ok_or(Problem::NsideUnknown { hdu: self.hdu, pixels: values })?;
             if self.ordering == Ordering::Nested {
                 grid.depth()?;
             }
@@ -288,23 +254,24 @@ impl Table {
             Some((first, last)) if first <= last && last < grid.pixels() && holds(last - first + 1) => {
                 Ok((grid, first..last + 1))
             }
-            _ => Err(Error::NsideClash {
+            _ => Err(Problem::NsideClash {
                 hdu: self.hdu,
                 nside: grid.nside(),
                 expected: grid.pixels(),
                 column: column.name.clone(),
                 found: values,
-            }),
+            }
+            .into()),
         }
     }
 
     /// How many consecutive pixels follow from each pixel number in an explicit table.
-    pub(super) fn run(&self, column: &Column, index: &Column, grain: usize) -> Result<usize, Error> {
+    pub(super) fn run(&self, column: &Column, index: &Column, grain: usize) -> Result<usize, Problem> {
         let run = column.repeat / index.repeat;
         if run > 0 && column.repeat.is_multiple_of(index.repeat) && (grain <= 1 || grain == run) {
             return Ok(run);
         }
-        Err(Error::Run {
+        Err(Problem::Run {
             hdu: self.hdu,
             column: column.name.clone(),
             values: column.repeat,
@@ -329,9 +296,9 @@ impl Column {
         matches!(self.kind, Kind::Integer { .. }) && self.repeat > 0
     }
 
-    fn check(&self, hdu: usize) -> Result<(), Error> {
+    pub(super) fn check(&self, hdu: usize) -> Result<(), Problem> {
         match self.kind {
-            Kind::Other(found) => Err(Error::ColumnKind { hdu, column: self.name.clone(), found }),
+            Kind::Other(found) => Err(Problem::ColumnKind { hdu, column: self.name.clone(), found }),
             _ => Ok(()),
         }
     }
@@ -342,12 +309,12 @@ fn check_size(fits: &mut FitsReader, hdu: usize) -> Result<(usize, u128), Error>
     let data = fits.extent()?.data;
     let mut side = |key| {
         let value = whole(fits, hdu, key)?.unwrap_or(0);
-        u64::try_from(value).map_err(|_| bad_key(hdu, key, value, "a size"))
+        Ok::<_, Error>(u64::try_from(value).map_err(|_| bad_key(hdu, key, value, "a size"))?)
     };
     let (width, rows) = (side("NAXIS1")?, side("NAXIS2")?);
     let needed = data as u128 + u128::from(width) * u128::from(rows);
     if needed > u128::from(fits.size()) {
-        return Err(Error::Truncated { hdu, needed, found: fits.size() });
+        return Err(Problem::Truncated { hdu, needed, found: fits.size() }.into());
     }
     let rows = usize::try_from(rows).map_err(|_| bad_key(hdu, "NAXIS2", rows, "a size"))?;
     Ok((rows, width.into()))
@@ -373,6 +340,7 @@ fn columns(fits: &mut FitsReader) -> Result<Vec<Column>, Error> {
                 number,
                 name: text(fits, &format!("TTYPE{number}"))?.unwrap_or_else(|| format!("col{number}")),
                 unit: text(fits, &format!("TUNIT{number}"))?,
+                quantity: quantity(fits, number)?,
                 kind,
                 repeat: usize::try_from(repeat).unwrap_or(0),
                 width: usize::try_from(width).unwrap_or(0),
@@ -381,15 +349,23 @@ fn columns(fits: &mut FitsReader) -> Result<Vec<Column>, Error> {
         .collect()
 }
 
+/// The quantity of a column, where the header states one.
+fn quantity(fits: &mut FitsReader, number: c_int) -> Result<Option<StatedQuantity>, Error> {
+    let Some(quantity) = text(fits, &format!("TQTY{number}"))? else { return Ok(None) };
+    let symmetry = text(fits, &format!("TSYM{number}"))?.and_then(|symmetry| symmetry.parse().ok());
+    Ok(Some(StatedQuantity { quantity, symmetry }))
+}
+
 /// The grid that the keyword NSIDE names.
 fn grid(fits: &mut FitsReader, hdu: usize) -> Result<Option<Healpix>, Error> {
     let Some(nside) = whole(fits, hdu, "NSIDE")? else { return Ok(None) };
     let grid = usize::try_from(nside).ok().and_then(|nside| Healpix::new(nside).ok());
-    grid.map(Some).ok_or_else(|| bad_key(hdu, "NSIDE", nside, "between 1 and 2^29"))
+    Ok(Some(grid.ok_or_else(|| bad_key(hdu, "NSIDE", nside, "between 1 and 2^29"))?))
 }
 
-pub(super) fn bad_key(hdu: usize, key: &str, value: impl ToString, expected: &'static str) -> Error {
-    Error::Keyword { hdu, key: key.to_owned(), value: value.to_string(), expected }
+/// An impossible value of a keyword.
+pub(super) fn bad_key(hdu: usize, key: &str, value: impl ToString, expected: &'static str) -> cfitsio::Problem {
+    cfitsio::Problem::Keyword { hdu, key: key.to_owned(), value: value.to_string(), expected }
 }
 
 /// A keyword's text, `None` where it is absent or blank. A number is the text of its digits.
@@ -401,25 +377,9 @@ pub(super) fn text(fits: &mut FitsReader, key: &str) -> Result<Option<String>, E
     }))
 }
 
-/// What stands between quotes; nothing where there are none.
-fn unquoted(raw: &str) -> Option<String> {
+/// The text between quotes; nothing where there are none.
+pub(super) fn unquoted(raw: &str) -> Option<String> {
     raw.strip_prefix('\'').map(|quoted| quoted.strip_suffix('\'').unwrap_or(quoted).replace("''", "'"))
-}
-
-/// The value of a header entry as it is written there. What is neither a number nor a truth value is text.
-fn card_value(raw: &str) -> CardValue {
-    if let Some(text) = unquoted(raw) {
-        return CardValue::Text(text.trim_end().to_owned());
-    }
-    match raw.trim() {
-        "T" => CardValue::Logical(true),
-        "F" => CardValue::Logical(false),
-        raw => match (raw.parse(), raw.replace(['D', 'd'], "E").parse()) {
-            (Ok(whole), _) => CardValue::Integer(whole),
-            (_, Ok(real)) => CardValue::Real(real),
-            _ => CardValue::Text(raw.to_owned()),
-        },
-    }
 }
 
 /// A keyword's number, `None` where it is absent or no number. Some files write numbers as text.
@@ -435,6 +395,6 @@ pub(super) fn whole(fits: &mut FitsReader, hdu: usize, key: &str) -> Result<Opti
     }
     match number(fits, key)? {
         Some(value) if value.fract() == 0.0 && value.abs() < 2f64.powi(53) => Ok(Some(value as i64)),
-        _ => Err(bad_key(hdu, key, text, "a whole number")),
+        _ => Err(bad_key(hdu, key, text, "a whole number").into()),
     }
 }

@@ -1,6 +1,6 @@
 //! HEALPix FITS files of whole maps, one table per extension, written one after the other.
 //!
-//! The same input always gives the same bytes. What the values and header entries mean is left to the caller.
+//! The same input always gives the same bytes. The meaning of values and header entries is left to the caller.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -10,41 +10,20 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 
+use super::problem::Problem;
+use crate::card::{Card, CardValue};
 use crate::cfitsio::FitsWriter;
-use crate::{Error, save};
+use crate::error::{self, Error};
+use crate::save::save;
 use longan_grid::accumulate::CHUNK;
 use longan_grid::{CoordinateSystem, Healpix, Ordering, UNSEEN};
-
-/// One entry of a header.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Card {
-    /// The keyword, one to eight of A-Z, 0-9, '-' and '_'.
-    pub key: String,
-    /// The value.
-    pub value: CardValue,
-    /// What it means; may be empty. It is cut where the line ends.
-    pub comment: String,
-}
-
-/// The value of a header entry.
-#[derive(Clone, Debug, PartialEq)]
-pub enum CardValue {
-    /// Text of any length. What is not printable ASCII is written as in a Rust string, such as `\u{e9}`.
-    Text(String),
-    /// A number; those that are not finite, which FITS cannot hold, are written as text.
-    Real(f64),
-    /// A whole number.
-    Integer(i64),
-    /// True or false.
-    Logical(bool),
-}
 
 /// One column of a table.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// Its name.
+    /// The column's name.
     pub name: String,
-    /// Its unit; may be empty.
+    /// The column's unit; may be empty.
     pub unit: String,
     /// A value for each pixel in RING order (whatever the ordering of the file), NaN where masked.
     pub values: Vec<f64>,
@@ -53,7 +32,7 @@ pub struct Column {
 /// One table.
 #[derive(Clone, Debug)]
 pub struct Extension {
-    /// Its name.
+    /// The table's name.
     pub name: String,
     /// Header entries after those of HEALPix.
     pub cards: Vec<Card>,
@@ -78,7 +57,7 @@ pub struct HealpixFile {
     pub extensions: Vec<Extension>,
 }
 
-/// What the tables of a file have in common.
+/// The grid and format that all tables of a file share.
 #[derive(Clone, Copy, Debug)]
 pub struct HealpixLayout {
     /// The grid of all columns.
@@ -107,15 +86,16 @@ const ROW: usize = 1024;
 /// Writes a file through [`save()`], gzip-compressed where the path ends in `.gz`.
 ///
 /// # Errors
-/// [`Error::File`], which names the file, around the reason: [`Error::ColumnLength`], [`Error::CardKey`],
-/// [`Error::LongName`], [`Error::Grid`], or those of [`save()`].
+/// [`ErrorKind::InvalidInput`](crate::ErrorKind::InvalidInput) where a column has the wrong length, or a keyword or a
+/// name is one that FITS does not have; [`ErrorKind::Unsupported`](crate::ErrorKind::Unsupported) where the grid has no
+/// NESTED ordering; or those of [`save()`]. The error names the file.
 pub fn write_healpix(path: &Path, file: &HealpixFile, overwrite: bool) -> Result<(), Error> {
     let HealpixFile { grid, ordering, coordinates, float32, ref extensions } = *file;
     let layout = HealpixLayout { grid, ordering, coordinates, float32 };
     layout
         .check()
         .and_then(|()| extensions.iter().try_for_each(|e| layout.check_extension(e)))
-        .map_err(|e| e.of(path))?;
+        .map_err(|e| e.with_path(path))?;
     save(path, overwrite, |path| {
         let mut writer = HealpixWriter::create(path, layout)?;
         extensions.iter().try_for_each(|extension| writer.append(extension))?;
@@ -128,7 +108,8 @@ impl HealpixWriter {
     /// where the path ends in `.gz`.
     ///
     /// # Errors
-    /// [`Error::Grid`], or [`Error::CfitsioWrite`].
+    /// [`ErrorKind::Unsupported`](crate::ErrorKind::Unsupported) where the grid has no NESTED ordering, or
+    /// [`ErrorKind::Unwritable`](crate::ErrorKind::Unwritable).
     pub fn create(path: &Path, layout: HealpixLayout) -> Result<Self, Error> {
         layout.check()?;
         let compressed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
@@ -141,7 +122,8 @@ impl HealpixWriter {
     /// Writes the next table.
     ///
     /// # Errors
-    /// [`Error::ColumnLength`], [`Error::CardKey`], [`Error::LongName`], or [`Error::CfitsioWrite`].
+    /// [`ErrorKind::InvalidInput`](crate::ErrorKind::InvalidInput) where the table does not suit the layout or FITS, or
+    /// [`ErrorKind::Unwritable`](crate::ErrorKind::Unwritable).
     pub fn append(&mut self, extension: &Extension) -> Result<(), Error> {
         self.layout.check_extension(extension)?;
         self.layout.write_header(&mut self.fits, extension)?;
@@ -154,7 +136,8 @@ impl HealpixWriter {
     /// Completes the file.
     ///
     /// # Errors
-    /// [`Error::CfitsioWrite`], or [`Error::Io`] where it cannot be compressed.
+    /// [`ErrorKind::Unwritable`](crate::ErrorKind::Unwritable), or [`ErrorKind::Io`](crate::ErrorKind::Io) where the file
+    /// cannot be compressed.
     pub fn finish(self) -> Result<(), Error> {
         self.fits.close()?;
         let Some(plain) = self.plain else { return Ok(()) };
@@ -185,18 +168,19 @@ impl HealpixLayout {
         for Card { key, .. } in &extension.cards {
             let legal = |b: u8| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
             if key.is_empty() || key.len() > 8 || !key.bytes().all(legal) {
-                return Err(Error::CardKey { key: key.clone() });
+                return Err(Problem::CardKey { key: key.clone() }.into());
             }
         }
         for column in &extension.columns {
             name(&column.name).and(name(&column.unit))?;
             if column.values.len() != self.grid.pixels() {
-                return Err(Error::ColumnLength {
+                return Err(error::Problem::ColumnLength {
                     column: column.name.clone(),
                     found: column.values.len(),
                     nside: self.grid.nside(),
                     expected: self.grid.pixels(),
-                });
+                }
+                .into());
             }
         }
         Ok(())
@@ -299,7 +283,7 @@ fn quoted_len(text: &str) -> usize {
 }
 
 /// A name or unit as a header can hold it.
-fn name(text: &str) -> Result<String, Error> {
+fn name(text: &str) -> Result<String, Problem> {
     let text = ascii(text);
-    if quoted_len(&text) > 68 { Err(Error::LongName { text }) } else { Ok(text) }
+    if quoted_len(&text) > 68 { Err(Problem::LongName { text }) } else { Ok(text) }
 }

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use longan_formats::{Error, Selection};
+use longan_formats::{ErrorKind, Selection};
 use serde_json::{Value, json};
 
 use crate::file::{FORMATS, File, Format, Values, Variable, variable};
-use crate::{problem, read, ring_values};
+use crate::{is, problem, read, ring_values};
 
 fn grid(attributes: Value) -> Variable {
     variable("crs", &[], Values::I32(vec![0]), attributes)
@@ -112,12 +112,12 @@ fn grids_that_cannot_be() {
     );
     check(
         [data(1), index(vec![1]), sizes("zuniq")],
-        "the cells of 'cell' reach Nside 536870912, beyond 8192; choose the resolution to bring them to with --nside",
+        "the cells of 'cell' reach Nside 536870912, beyond 8192; choose the resolution to bring them to",
     );
     let other = Selection { nside: Some(4), ..Selection::default() };
     assert_eq!(
         told(&File::of([data(48), ring()]), &other),
-        "variable 't' has Nside 2, so it cannot be read at Nside 4; leave --nside out, or degrade the field first (for example with healpy.ud_grade)"
+        "variable 't' has Nside 2, so it cannot be read at Nside 4; leave the Nside out, or degrade the field first (for example with healpy.ud_grade)"
     );
     let fine = || healpix(json!({"indexing_scheme": "nested", "refinement_level": 29}));
     let told = told(&File::of([data(1), index(vec![3]), fine()]), &Selection::default());
@@ -152,17 +152,17 @@ fn stores_that_cannot_be() {
         for cut in [0, 1, whole.len() / 2, whole.len() - 1] {
             fs::write(&array, &whole[..cut]).unwrap();
             let (error, told) = problem(read(&path));
-            assert!(matches!(error, Error::ZarrMetadata { .. }) && told.contains("it is no JSON"), "{told}");
+            assert!(is(&error, ErrorKind::Corrupt, "the metadata of") && told.contains("it is no JSON"), "{told}");
         }
         for metadata in ["null", "[]", "{}", "3", r#"{"zarr_format":2}"#, r#"{"node_type":"array","zarr_format":3}"#] {
             fs::write(&array, metadata).unwrap();
-            assert!(matches!(problem(read(&path)).0, Error::ZarrMetadata { .. }), "{metadata}");
+            assert!(is(&problem(read(&path)).0, ErrorKind::Corrupt, "the metadata of"), "{metadata}");
         }
         fs::write(&array, &whole).unwrap();
         read(&path).unwrap();
         // A folder that is none any more.
         fs::remove_file(root).unwrap();
-        assert!(matches!(problem(read(&path)).0, Error::Folder));
+        assert!(is(&problem(read(&path)).0, ErrorKind::NotAFile, "this is a folder"));
     }
 }
 
@@ -275,15 +275,13 @@ fn chunks_of_other_bytes() {
                 changed[at] ^= bits;
                 fs::write(&chunk, &changed).unwrap();
                 if let Err(error) = read(&path) {
-                    assert!(
-                        matches!(error, Error::File { ref problem, .. } if matches!(**problem, Error::Zarr { .. }))
-                    );
+                    assert!(error.path().is_some() && is(&error, ErrorKind::Unreadable, "the Zarr library says"));
                 }
             }
         }
         for other in [vec![], vec![0; 1000], b"{}".to_vec()] {
             fs::write(&chunk, &other).unwrap();
-            assert!(matches!(problem(read(&path)).0, Error::Zarr { .. }));
+            assert!(is(&problem(read(&path)).0, ErrorKind::Unreadable, "the Zarr library says"));
         }
     }
 }

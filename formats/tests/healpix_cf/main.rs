@@ -10,7 +10,7 @@ mod zarr;
 
 use std::path::Path;
 
-use longan_formats::{Error, Field, Selection};
+use longan_formats::{Error, ErrorKind, Field, Selection};
 use longan_grid::Map;
 
 /// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
@@ -39,13 +39,20 @@ fn field(name: &str) -> Selection {
     Selection { field: Some(Field::Name(name.to_owned())), ..Selection::default() }
 }
 
-/// What is wrong, and what the user is told after the file's name.
+/// The error, and its sentence without the file's name.
 #[track_caller]
 fn problem<T>(result: Result<T, Error>) -> (Error, String) {
-    let Err(Error::File { problem, .. }) = result else { panic!("no error, or none that names the file") };
-    let told = problem.to_string();
+    let Err(error) = result else { panic!("no error") };
+    assert!(error.path().is_some(), "an error that does not name the file");
+    let told = error.problem().to_string();
     assert!(!told.contains('\n') && !told.ends_with('.'), "{told}");
-    (*problem, told)
+    (error, told)
+}
+
+/// Whether an error is of a kind, and its sentence has this part.
+#[track_caller]
+fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
+    error.kind() == kind && error.problem().to_string().contains(part)
 }
 
 /// Asserts that two maps have the same bits, NaN equal to NaN.

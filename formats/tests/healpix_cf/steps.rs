@@ -1,10 +1,10 @@
 //! Other dimensions, time, and packed numbers.
 
-use longan_formats::{At, Error, Place, Selection, open};
+use longan_formats::{Ask, At, ErrorKind, Place, Selection, open};
 use serde_json::json;
 
 use crate::file::{FORMATS, File, Values, variable};
-use crate::{assert_same, problem, ring_values};
+use crate::{assert_same, is, problem, ring_values};
 
 fn at(dimension: &str, place: Place) -> Selection {
     Selection { at: vec![At { dimension: dimension.to_owned(), place }], ..Selection::default() }
@@ -59,9 +59,11 @@ fn steps_and_levels_in_any_order() {
                 assert_eq!(map.time.unwrap().label, labels[step]);
             }
             let (error, _) = problem(open(&path, &Selection::default()));
-            assert!(matches!(error, Error::DimensionLeft { dimension, .. } if dimension == "level"));
+            assert!(is(&error, ErrorKind::Ambiguous, "has several values along 'level'"));
+            let level = Ask::Place { dimension: Some("level".to_owned()), place: None };
+            assert_eq!(error.ask(), Some(&level));
             let (error, _) = problem(open(&path, &at("cell", Place::Index(0))));
-            assert!(matches!(error, Error::SphereDimension { .. }));
+            assert!(is(&error, ErrorKind::NotApplicable, "runs over the sphere"));
         }
     }
 }

@@ -10,7 +10,7 @@ mod writing;
 
 use std::path::PathBuf;
 
-use longan_formats::{Error, Field, Selection};
+use longan_formats::{Error, ErrorKind, Field, Selection};
 use longan_grid::Map;
 
 /// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
@@ -56,17 +56,33 @@ fn field(text: &str) -> Selection {
     Selection { field: Some(text.parse::<Field>().unwrap()), ..Selection::default() }
 }
 
-/// The problem with a file of these bytes, and what the user is told after the file's name.
+/// The error about a file of these bytes, and its sentence without the file's name.
 fn problem_with(bytes: &[u8], selection: &Selection) -> (Error, String) {
     problem(read_with(bytes, selection))
 }
 
+/// The error, and its sentence without the file's name.
+#[track_caller]
 fn problem<T>(result: Result<T, Error>) -> (Error, String) {
-    let Err(Error::File { path, problem }) = result else { panic!("no error, or none that names the file") };
-    let (told, all) = (problem.to_string(), Error::File { path: path.clone(), problem: Box::new(Error::Exists) });
-    assert!(all.to_string().starts_with(&path.display().to_string().replace(char::is_control, "\u{fffd}")));
+    let Err(error) = result else { panic!("no error") };
+    let path = error.path().expect("an error that names the file");
+    let told = error.problem().to_string();
+    let shown = path.display().to_string().replace(char::is_control, "\u{fffd}");
+    assert_eq!(error.to_string(), format!("{shown}: {told}"));
     assert!(!told.contains('\n') && !told.ends_with('.') && !told.contains("map.fits"), "{told}");
-    (*problem, told)
+    (error, told)
+}
+
+/// Whether an error is of a kind, and its sentence has this part.
+#[track_caller]
+fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
+    error.kind() == kind && error.problem().to_string().contains(part)
+}
+
+/// The problem of the grid in an error.
+#[track_caller]
+fn grid(error: &Error) -> &longan_grid::Error {
+    error.problem().downcast_ref().unwrap_or_else(|| panic!("no problem of the grid: {error}"))
 }
 
 /// Asserts that two maps have the same bits, NaN equal to NaN.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use longan_formats::{Error, HealpixFile, write_healpix};
+use longan_formats::{ErrorKind, HealpixFile, write_healpix};
 use longan_grid::{Healpix, Ordering};
 
 use crate::*;
@@ -131,7 +131,7 @@ fn paths_that_cannot_be() {
     std::fs::write(&path, map(4.0)).unwrap();
     let (error, told) = problem(longan_formats::read(&path, &Selection::default()));
     let length = path.as_os_str().len();
-    assert!(matches!(error, Error::PathTooLong { bytes, .. } if bytes == length), "{told}");
+    assert!(is(&error, ErrorKind::Unsupported, &format!("the path has {length} bytes")), "{told}");
     // One that just fits.
     let short = "x".repeat(1000 - long.parent().unwrap().as_os_str().len() - 1 - ".fits".len());
     let fitting = long.parent().unwrap().join(short[..short.len().min(240)].to_owned() + ".fits");
@@ -139,5 +139,5 @@ fn paths_that_cannot_be() {
     assert_same(longan_formats::read(&fitting, &Selection::default()).unwrap().values(), &[4.0; 12]);
 
     let (nul, told) = problem(longan_formats::read(Path::new("a\0.fits"), &Selection::default()));
-    assert!(matches!(nul, Error::Io { .. }), "{told}");
+    assert!(is(&nul, ErrorKind::Io, "cannot "), "{told}");
 }

@@ -1,5 +1,6 @@
 //! Files written are valid, and read by this and other software.
 
+use longan_formats::ErrorKind;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -8,7 +9,7 @@ use longan_formats::*;
 
 use longan_grid::{CoordinateSystem, Healpix, Ordering};
 
-use crate::{assert_same, problem};
+use crate::{assert_same, grid, is, problem};
 
 fn value(scale: f64, pixel: usize) -> f64 {
     if pixel % 7 == 3 { f64::NAN } else { scale * pixel as f64 }
@@ -228,7 +229,7 @@ fn tables_one_by_one_give_the_same_bytes() {
         writer.append(&short)?;
         writer.finish()
     }));
-    assert!(matches!(error, Error::ColumnLength { found: 107, nside: 3, expected: 108, .. }));
+    assert!(is(&error, ErrorKind::InvalidInput, "has 107 values but Nside 3 has 108 pixels"));
     assert!(!path.exists());
 }
 
@@ -241,24 +242,38 @@ fn what_cannot_be_written() {
         change(&mut file);
         problem(write_healpix(&path, &file, false)).0
     };
-    assert!(matches!(
-        error_of(&|f| f.ordering = Ordering::Nested),
-        Error::Grid(longan_grid::Error::NotNested { nside: 3 })
-    ));
+    let nested = error_of(&|f| f.ordering = Ordering::Nested);
+    assert_eq!(grid(&nested), &longan_grid::Error::NotNested { nside: 3 });
     let short = error_of(&|f| f.extensions[1].columns[0].values.truncate(7));
-    assert!(matches!(short, Error::ColumnLength { found: 7, nside: 3, expected: 108, .. }));
+    assert!(is(&short, ErrorKind::InvalidInput, "has 7 values but Nside 3 has 108 pixels"));
     for key in ["", "lower", "NINE_LONG", "SP ACE", "GRÖSSE", "A\n"] {
         let error = error_of(&|f| f.extensions[0].cards.push(card(key, CardValue::Integer(1))));
-        assert!(matches!(&error, Error::CardKey { key: k } if k == key));
+        assert!(is(&error, ErrorKind::InvalidInput, &format!("{key:?} is not a FITS keyword")));
     }
     let long = "x".repeat(69);
-    assert!(matches!(error_of(&|f| f.extensions[0].columns[1].unit = long.clone()), Error::LongName { .. }));
-    assert!(matches!(error_of(&|f| f.extensions[0].columns[1].name = long.clone()), Error::LongName { .. }));
-    assert!(matches!(error_of(&|f| f.extensions[1].name = "'".repeat(35)), Error::LongName { .. }));
+    assert!(is(
+        &error_of(&|f| f.extensions[0].columns[1].unit = long.clone()),
+        ErrorKind::InvalidInput,
+        "longer than the 68 characters"
+    ));
+    assert!(is(
+        &error_of(&|f| f.extensions[0].columns[1].name = long.clone()),
+        ErrorKind::InvalidInput,
+        "longer than the 68 characters"
+    ));
+    assert!(is(
+        &error_of(&|f| f.extensions[1].name = "'".repeat(35)),
+        ErrorKind::InvalidInput,
+        "longer than the 68 characters"
+    ));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 
     fs::write(&path, "old").unwrap();
-    assert!(matches!(problem(write_healpix(&path, &file(1, Ordering::Ring, false), false)).0, Error::Exists));
+    assert!(is(
+        &problem(write_healpix(&path, &file(1, Ordering::Ring, false), false)).0,
+        ErrorKind::Exists,
+        "the file exists"
+    ));
     assert_eq!(fs::read_to_string(&path).unwrap(), "old");
 }
 

@@ -10,7 +10,7 @@ mod selections;
 
 use std::path::Path;
 
-use longan_formats::{At, Error, Field, Place, Selection};
+use longan_formats::{At, Error, ErrorKind, Field, Place, Selection};
 use longan_grid::Map;
 
 use inputs::{Data, Nc, text, var};
@@ -75,13 +75,26 @@ fn at(places: &[&str]) -> Selection {
     Selection { at: places.iter().map(one).collect(), ..Selection::default() }
 }
 
-/// The problem, and what the user is told after the file's name.
+/// The error, and its sentence without the file's name.
 #[track_caller]
 fn problem<T>(result: Result<T, Error>) -> (Error, String) {
-    let Err(Error::File { path, problem }) = result else { panic!("no error, or none that names the file") };
-    let told = problem.to_string();
+    let Err(error) = result else { panic!("no error") };
+    let path = error.path().expect("an error that names the file");
+    let told = error.problem().to_string();
     assert!(!told.contains('\n') && !told.ends_with('.') && !told.contains(&path.display().to_string()), "{told}");
-    (*problem, told)
+    (error, told)
+}
+
+/// Whether an error is of a kind, and its sentence has this part.
+#[track_caller]
+fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
+    error.kind() == kind && error.problem().to_string().contains(part)
+}
+
+/// The problem of the grid in an error.
+#[track_caller]
+fn grid(error: &Error) -> &longan_grid::Error {
+    error.problem().downcast_ref().unwrap_or_else(|| panic!("no problem of the grid: {error}"))
 }
 
 /// Asserts that two maps are the same but for rounding, and NaN in the same places.

@@ -1,6 +1,7 @@
 //! Values at points against plain sums over all of them, and against the fields that they are samples of.
 
 use crate::*;
+use longan_formats::{Ask, Error, ErrorKind};
 
 /// A field of the first and second degree.
 fn harmonic([x, y, z]: [f64; 3]) -> f64 {
@@ -163,19 +164,14 @@ fn coincident_points() {
 #[test]
 fn one_place_needs_settings() {
     let text = "lon,lat,v\n10,20,1\n10,20,2\n";
-    assert!(matches!(
-        problem_with(text.as_bytes(), &Selection::default()).0,
-        Error::Grid(longan_grid::Error::OnePlace)
-    ));
+    let one_place = |error: &Error| {
+        assert_eq!(grid(error), &longan_grid::Error::OnePlace);
+        assert_eq!((error.kind(), error.ask()), (ErrorKind::Incomplete, Some(&Ask::Reach)));
+    };
+    one_place(&problem_with(text.as_bytes(), &Selection::default()).0);
     let reach = Regrid { reach: Some(30.0), ..Regrid::default() };
-    assert!(matches!(
-        problem_with(text.as_bytes(), &Selection { regrid: reach.clone(), ..Selection::default() }).0,
-        Error::Grid(longan_grid::Error::OnePlace)
-    ));
-    assert!(matches!(
-        problem_with(text.as_bytes(), &nside(4, Regrid::default())).0,
-        Error::Grid(longan_grid::Error::OnePlace)
-    ));
+    one_place(&problem_with(text.as_bytes(), &Selection { regrid: reach.clone(), ..Selection::default() }).0);
+    one_place(&problem_with(text.as_bytes(), &nside(4, Regrid::default())).0);
     let map = read_with(text.as_bytes(), &nside(16, reach)).unwrap();
     let covered = map.values().iter().filter(|v| v.is_finite()).count() as f64 / map.grid().pixels() as f64;
     assert!((covered - (1.0 - 30f64.to_radians().cos()) / 2.0).abs() < 0.01);
@@ -208,7 +204,7 @@ fn settings_that_cannot_be() {
         for regrid in [Regrid { reach: Some(bad), ..Regrid::default() }, gather(Gather::Gaussian { fwhm: bad })] {
             let (error, told) = problem_with(text.as_bytes(), &nside(4, regrid));
             assert!(
-                matches!(error, Error::Grid(longan_grid::Error::Setting { .. })) && told.contains(&bad.to_string()),
+                matches!(grid(&error), longan_grid::Error::Setting { .. }) && told.contains(&bad.to_string()),
                 "{told}"
             );
         }
@@ -216,10 +212,7 @@ fn settings_that_cannot_be() {
     for bad in [0, usize::MAX, 1 << 29] {
         let error = problem_with(text.as_bytes(), &nside(bad, Regrid::default())).0;
         assert!(
-            matches!(
-                error,
-                Error::Grid(longan_grid::Error::Nside { .. }) | Error::Grid(longan_grid::Error::Memory { .. })
-            ),
+            matches!(grid(&error), longan_grid::Error::Nside { .. } | longan_grid::Error::Memory { .. }),
             "{error}"
         );
     }

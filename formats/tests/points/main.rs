@@ -10,7 +10,7 @@ mod tables;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use longan_formats::{Error, Selection};
+use longan_formats::{Error, ErrorKind, Selection};
 use longan_grid::{Gather, Healpix, Map, Regrid};
 
 /// A file in a folder of its own.
@@ -43,15 +43,26 @@ fn gather(gather: Gather) -> Regrid {
     Regrid { gather: Some(gather), ..Regrid::default() }
 }
 
-/// The problem with a file of these bytes, and what the user is told after the file's name.
+/// The error about a file of these bytes, and its sentence without the file's name.
 #[track_caller]
 fn problem_with(bytes: &[u8], selection: &Selection) -> (Error, String) {
-    let Err(Error::File { problem, .. }) = read_with(bytes, selection) else {
-        panic!("no error, or none that names the file")
-    };
-    let told = problem.to_string();
+    let Err(error) = read_with(bytes, selection) else { panic!("no error") };
+    assert!(error.path().is_some(), "an error that does not name the file");
+    let told = error.problem().to_string();
     assert!(!told.contains('\n') && !told.ends_with('.') && told.len() < 400, "{told}");
-    (*problem, told)
+    (error, told)
+}
+
+/// Whether an error is of a kind, and its sentence has this part.
+#[track_caller]
+fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
+    error.kind() == kind && error.problem().to_string().contains(part)
+}
+
+/// The problem of the grid in an error.
+#[track_caller]
+fn grid(error: &Error) -> &longan_grid::Error {
+    error.problem().downcast_ref().unwrap_or_else(|| panic!("no problem of the grid: {error}"))
 }
 
 /// Asserts that two maps have the same bits, NaN equal to NaN.

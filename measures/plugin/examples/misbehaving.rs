@@ -1,6 +1,6 @@
 //! A plugin whose measures fail in every way, for the tests.
 
-use longan_plugin::{Measure, MeasureError, Needs, Window};
+use longan_plugin::{Measure, MeasureError, Needs, Quantity, Window};
 
 /// How to fail.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +19,10 @@ impl Measure for Misbehaving {
 
     fn definition(&self) -> String {
         "a failure".to_owned()
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity::Number
     }
 
     fn unit(&self) -> &str {

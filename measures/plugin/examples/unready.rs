@@ -1,6 +1,6 @@
 //! A plugin that panics when it is asked for its measures, for the tests.
 
-use longan_plugin::{Measure, Needs, Window};
+use longan_plugin::{Measure, Needs, Quantity, Window};
 
 struct Unready;
 
@@ -17,6 +17,10 @@ impl Measure for Unready {
 
     fn definition(&self) -> String {
         "nothing".to_owned()
+    }
+
+    fn quantity(&self) -> Quantity {
+        Quantity::Number
     }
 
     fn unit(&self) -> &str {

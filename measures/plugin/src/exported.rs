@@ -1,4 +1,4 @@
-//! What the macro exports: measures as the C interface has them.
+//! Measures as the C interface has them, which the macro exports.
 //!
 //! All `unsafe` of a plugin in Rust is here.
 
@@ -10,7 +10,7 @@ use std::ptr;
 use std::sync::OnceLock;
 
 use longan_measures::plugin::interface::*;
-use longan_measures::{Measure, Weight, Window};
+use longan_measures::{Measure, Quantity, Weight, Window};
 use num_complex::Complex64;
 
 /// A plugin's name, version and measures.
@@ -58,11 +58,11 @@ thread_local! {
     static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// The result, or what a panic says.
+/// The result, or the text of a panic.
 fn caught<T>(of: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(of)).unwrap_or_else(|panic| {
         let said = said(&*panic);
-        // What was thrown may panic anew when it is dropped.
+        // The value that was thrown may panic anew when it is dropped.
         std::mem::forget(panic);
         Err(format!("it panicked{}: {said}", PLACE.take()))
     })
@@ -129,7 +129,7 @@ fn text(text: String) -> Result<*const c_char, String> {
     Ok(text.into_raw())
 }
 
-/// A measure and what is asked of it with every call.
+/// A measure, with the needs that every call asks for.
 struct Called {
     measure: Box<dyn Measure>,
     /// Whether ψ_0 is among the moments.
@@ -144,6 +144,7 @@ fn described(measure: Box<dyn Measure>) -> Result<LonganMeasure, String> {
     let ranks: &'static [u32] = needs.ranks.leak();
     let (name, definition, unit, rank) =
         (measure.name(), measure.definition(), measure.unit().to_owned(), measure.rank());
+    let quantity = measure.quantity();
     let has_psi0 = ranks.first() == Some(&0);
     let called = Called { measure, has_psi0, ranks: ranks[usize::from(has_psi0)..].to_vec() };
     Ok(LonganMeasure {
@@ -157,6 +158,8 @@ fn described(measure: Box<dyn Measure>) -> Result<LonganMeasure, String> {
             Some(Weight::Length) => LONGAN_WEIGHT_LENGTH,
             Some(Weight::Curvature) => LONGAN_WEIGHT_CURVATURE,
         },
+        quantity: number_of(quantity)?,
+        symmetry: quantity.symmetry().unwrap_or(0),
         ranks: ranks.as_ptr(),
         ranks_count: ranks.len() as u32,
         name: text(name)?,
@@ -164,6 +167,23 @@ fn described(measure: Box<dyn Measure>) -> Result<LonganMeasure, String> {
         unit: text(unit)?,
         evaluate: Some(evaluate),
         context: ptr::from_ref::<Called>(Box::leak(Box::new(called))).cast(),
+    })
+}
+
+/// The number that the interface has for a quantity.
+fn number_of(quantity: Quantity) -> Result<u32, String> {
+    Ok(match quantity {
+        Quantity::Area => LONGAN_QUANTITY_AREA,
+        Quantity::Length => LONGAN_QUANTITY_LENGTH,
+        Quantity::Curvature => LONGAN_QUANTITY_CURVATURE,
+        Quantity::Moment => LONGAN_QUANTITY_MOMENT,
+        Quantity::Count => LONGAN_QUANTITY_COUNT,
+        Quantity::Ratio => LONGAN_QUANTITY_RATIO,
+        Quantity::Angle { .. } => LONGAN_QUANTITY_ANGLE,
+        Quantity::Deviation => LONGAN_QUANTITY_DEVIATION,
+        Quantity::Percentile => LONGAN_QUANTITY_PERCENTILE,
+        Quantity::Number => LONGAN_QUANTITY_NUMBER,
+        other => return Err(format!("the interface has no number for the quantity '{other}'")),
     })
 }
 

@@ -5,7 +5,7 @@
 //! error that the user sees.
 //!
 //! ```
-//! use longan_plugin::{Measure, Needs, Window};
+//! use longan_plugin::{Measure, Needs, Quantity, Window};
 //!
 //! /// The share of the contour that lies along one direction.
 //! struct Share;
@@ -17,6 +17,10 @@
 //!
 //!     fn definition(&self) -> String {
 //!         "normalised anisotropy of rank 2, |ψ_2|/ψ_0".to_owned()
+//!     }
+//!
+//!     fn quantity(&self) -> Quantity {
+//!         Quantity::Ratio
 //!     }
 //!
 //!     fn unit(&self) -> &str {
@@ -47,7 +51,7 @@ compile_error!("a plugin of longan must be built with panic = \"unwind\", so tha
 
 mod exported;
 
-pub use longan_measures::{Measure, MeasureError, Needs, Weight, Window, testing};
+pub use longan_measures::{Measure, MeasureError, Needs, Quantity, Weight, Window, testing};
 pub use num_complex::Complex64;
 
 #[doc(hidden)]

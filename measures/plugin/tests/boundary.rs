@@ -1,8 +1,8 @@
-//! What a plugin in Rust shows at its C interface, called as longan calls it but without loading a library.
+//! The C interface of a plugin in Rust, called as longan calls it but without loading a library.
 
 use std::ffi::{CStr, c_char};
 
-use longan_plugin::{Exported, LonganPlugin, Measure, MeasureError, Needs, Weight, Window};
+use longan_plugin::{Exported, LonganPlugin, Measure, MeasureError, Needs, Quantity, Weight, Window};
 use longan_plugin::{Message, Text, interface::*};
 
 /// Measures by their number.
@@ -17,8 +17,16 @@ impl Measure for Numbered {
         format!("measure {}", self.0)
     }
 
+    fn quantity(&self) -> Quantity {
+        match self.0 {
+            0 => Quantity::Length,
+            1 => Quantity::Angle { symmetry: 5 },
+            _ => Quantity::Number,
+        }
+    }
+
     fn unit(&self) -> &str {
-        "rad"
+        if self.0 == 1 { "deg" } else { "rad" }
     }
 
     fn rank(&self) -> u32 {
@@ -111,6 +119,8 @@ fn measures_are_described_as_they_are() {
     assert_eq!([text(sum.name), text(sum.definition), text(sum.unit)], ["sum", "measure 0", "rad"]);
     assert_eq!((sum.needs, sum.weight, sum.ranks_count), (LONGAN_NEEDS_AREA, LONGAN_WEIGHT_CURVATURE, 2));
     assert_eq!((panicking.needs, panicking.weight, panicking.rank), (LONGAN_NEEDS_CURVATURE, LONGAN_WEIGHT_EITHER, 1));
+    assert_eq!((sum.quantity, sum.symmetry), (LONGAN_QUANTITY_LENGTH, 0));
+    assert_eq!((panicking.quantity, panicking.symmetry), (LONGAN_QUANTITY_ANGLE, 5));
     // Once is enough.
     assert_eq!(measures().as_ptr(), measures().as_ptr());
 }

@@ -1,11 +1,11 @@
-//! Reading and checking what a plugin says of itself.
+//! Reading and checking the description that a plugin gives of itself.
 
 use std::collections::HashSet;
 use std::ffi::c_char;
 
-use super::Problem;
 use super::interface::*;
-use crate::{Needs, Weight};
+use super::problem::Problem;
+use crate::{Needs, Quantity, Weight};
 
 /// Most characters of a name: it becomes a FITS column's, with the plugin's at times.
 const NAME_MAX: usize = 60;
@@ -14,6 +14,7 @@ const NAME_MAX: usize = 60;
 pub(super) struct Described {
     pub(super) name: String,
     pub(super) definition: String,
+    pub(super) quantity: Quantity,
     pub(super) unit: String,
     pub(super) rank: u32,
     pub(super) needs: Needs,
@@ -32,7 +33,7 @@ unsafe impl Sync for Pointer {}
 /// The name, the version and the measures of a plugin.
 ///
 /// # Safety
-/// What the pointers lead to is as the interface says, if they are neither null nor misaligned. Sizes are checked before
+/// Pointers that are neither null nor misaligned lead to what the interface says. Sizes are checked before
 /// anything that depends on them is read.
 pub(super) unsafe fn read(plugin: *const LonganPlugin) -> Result<(String, String, Vec<Described>), Problem> {
     check(plugin, || "its description".to_owned())?;
@@ -119,6 +120,7 @@ unsafe fn read_measure(pointer: *const LonganMeasure, i: usize) -> Result<Descri
         LONGAN_WEIGHT_CURVATURE => Some(Weight::Curvature),
         other => return Err(impossible(format!("has the weight {other}, which is not between 0 and 2"))),
     };
+    let quantity = read_quantity(&measure, &unit).map_err(impossible)?;
     let needs = Needs {
         area: measure.needs & LONGAN_NEEDS_AREA != 0,
         length: measure.needs & LONGAN_NEEDS_LENGTH != 0,
@@ -126,7 +128,35 @@ unsafe fn read_measure(pointer: *const LonganMeasure, i: usize) -> Result<Descri
         ranks,
         weight,
     };
-    Ok(Described { name, definition, unit, rank: measure.rank, needs, evaluate, measure: Pointer(pointer) })
+    Ok(Described { name, definition, quantity, unit, rank: measure.rank, needs, evaluate, measure: Pointer(pointer) })
+}
+
+/// The quantity, or the fault of what the plugin states as one.
+fn read_quantity(measure: &LonganMeasure, unit: &str) -> Result<Quantity, String> {
+    let symmetry = measure.symmetry;
+    let quantity = match measure.quantity {
+        LONGAN_QUANTITY_AREA => Quantity::Area,
+        LONGAN_QUANTITY_LENGTH => Quantity::Length,
+        LONGAN_QUANTITY_CURVATURE => Quantity::Curvature,
+        LONGAN_QUANTITY_MOMENT => Quantity::Moment,
+        LONGAN_QUANTITY_COUNT => Quantity::Count,
+        LONGAN_QUANTITY_RATIO => Quantity::Ratio,
+        LONGAN_QUANTITY_ANGLE => Quantity::Angle { symmetry },
+        LONGAN_QUANTITY_DEVIATION => Quantity::Deviation,
+        LONGAN_QUANTITY_PERCENTILE => Quantity::Percentile,
+        LONGAN_QUANTITY_NUMBER => Quantity::Number,
+        0 => return Err("does not state its quantity, from LONGAN_QUANTITY_AREA to LONGAN_QUANTITY_NUMBER".to_owned()),
+        other => return Err(format!("has the quantity {other}, which is not between 1 and {LONGAN_QUANTITY_NUMBER}")),
+    };
+    match quantity {
+        Quantity::Angle { .. } if !(1..=LONGAN_RANK_MAX).contains(&symmetry) => {
+            Err(format!("is an angle of the symmetry {symmetry}, which is not between 1 and {LONGAN_RANK_MAX}"))
+        }
+        Quantity::Angle { .. } if unit != "deg" => Err(format!("is an angle in '{unit}', and angles are in 'deg'")),
+        Quantity::Angle { .. } => Ok(quantity),
+        _ if symmetry != 0 => Err(format!("has the symmetry {symmetry}, and only an angle has one")),
+        _ => Ok(quantity),
+    }
 }
 
 fn check<T>(pointer: *const T, what: impl Fn() -> String) -> Result<(), Problem> {
@@ -164,7 +194,7 @@ unsafe fn read_line(pointer: *const c_char, what: &str) -> Result<String, Proble
     Err(fault(format!("does not end within {LONGAN_TEXT_SIZE} bytes")))
 }
 
-/// The same, not empty.
+/// As [`read_line`], but not an empty text.
 ///
 /// # Safety
 /// As [`read_line`].

@@ -32,6 +32,12 @@
 #ifndef UNIT
 #define UNIT "rad"
 #endif
+#ifndef QUANTITY
+#define QUANTITY LONGAN_QUANTITY_LENGTH
+#endif
+#ifndef SYMMETRY
+#define SYMMETRY 0
+#endif
 #ifndef RANK
 #define RANK 2
 #endif
@@ -130,6 +136,8 @@ const LonganMeasure measures[] = {
         .rank = RANK,
         .needs = NEEDS,
         .weight = WEIGHT,
+        .quantity = QUANTITY,
+        .symmetry = SYMMETRY,
         .ranks = RANKS_POINTER,
         .ranks_count = RANKS_COUNT,
         .name = MEASURE,
@@ -140,6 +148,7 @@ const LonganMeasure measures[] = {
     {
         .size = sizeof(LonganMeasure),
         .needs = LONGAN_NEEDS_LENGTH,
+        .quantity = LONGAN_QUANTITY_LENGTH,
         .name = SECOND,
         .definition = "length, as contour-length",
         .unit = "rad",

@@ -1,12 +1,16 @@
 //! HEALPix maps in FITS files.
 //!
-//! [`table`] understands headers, [`read`] fetches values, [`multi_order`] those of cells of several sizes,
+//! [`scan`] finds tables, [`table`] understands headers, [`mod@describe`] tells what they say, [`values`] fetches the
+//! numbers of a column, [`read`] puts them onto the grid, [`multi_order`] those of cells of several sizes,
 //! [`mod@write`] makes files. The bytes themselves are left to [`crate::cfitsio`].
 
+mod describe;
 mod multi_order;
+mod problem;
 mod read;
 mod scan;
 mod table;
+mod values;
 mod write;
 
 use std::fs::File;
@@ -16,12 +20,15 @@ use std::path::Path;
 use flate2::bufread::MultiGzDecoder;
 use tempfile::NamedTempFile;
 
-use crate::adapter::{gunzipped_head, is_gzip};
+use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate};
 use crate::cfitsio::FitsReader;
-use crate::{About, Adapter, Description, Error, Maps, Room, Selection};
+use crate::describe::Description;
+use crate::error::{self, Error};
+use crate::gzip::{gunzipped_head, is_gzip};
+use crate::request::Selection;
 use longan_grid::{Healpix, Map, Sphere, Time};
 
-pub use write::{Card, CardValue, Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
+pub use write::{Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
 
 /// FITS files consist of blocks of this many bytes.
 const BLOCK: u64 = 2880;
@@ -47,39 +54,40 @@ impl Adapter for HealpixFits {
         let mut fits = open(path)?;
         let tables = scan::healpix_tables(&mut fits)?
             .into_iter()
-            .map(|hdu| table::Table::parse(&mut fits, hdu)?.describe(&mut fits))
+            .map(|hdu| describe::describe(&table::Table::parse(&mut fits, hdu)?, &mut fits))
             .collect::<Result<_, _>>()?;
         Ok(Description { format: self.name(), tables })
     }
 
-    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
         let mut fits = open(path)?;
         let hdu = scan::choose(&mut fits, selection.hdu)?;
         let table = table::Table::parse(&mut fits, hdu)?;
         let column = table.column(selection.field.as_ref())?.clone();
-        Ok(Box::new(One { fits, table, column, selection: selection.clone() }))
+        Ok(Box::new(SingleMap { fits, table, column, selection: selection.clone() }))
     }
 }
 
 /// The one map of a table.
-struct One {
+struct SingleMap {
     fits: FitsReader,
     table: table::Table,
     column: table::Column,
     selection: Selection,
 }
 
-impl Maps for One {
+impl MapSeries for SingleMap {
     fn times(&self) -> &[Time] {
         &[]
     }
 
     fn about(&self) -> About {
         let (name, unit) = (self.column.name.clone(), self.column.unit.clone());
-        About { name, unit, coordinates: self.table.coordinates, sphere: Sphere::Sky }
+        let quantity = self.column.quantity.clone();
+        About { name, unit, coordinates: self.table.coordinates, sphere: Sphere::Sky, quantity }
     }
 
-    fn room(&self) -> Option<Room> {
+    fn memory(&self) -> Option<MemoryEstimate> {
         let column = &self.column;
         let grid = match &self.table.layout {
             table::Layout::Implicit { named } => self.table.implicit(column, *named).ok()?.0,
@@ -92,7 +100,7 @@ impl Maps for One {
             table::Layout::Explicit { .. } => grid.pixels() / 8,
             table::Layout::MultiOrder { .. } => self.table.rows.saturating_mul(16),
         };
-        Some(Room::of(grid, beside))
+        Some(MemoryEstimate::of(grid, beside))
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
@@ -120,12 +128,17 @@ fn open(path: &Path) -> Result<FitsReader, Error> {
 
 /// Opens a temporary file of the same content.
 fn unpack(mut from: impl Read) -> Result<FitsReader, Error> {
-    let unpack_error = |cause: io::Error| match cause.kind() {
-        // What the decompressor says, but never the operating system.
-        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
-            Error::Gzip { cause }
+    let unpack_error = |cause: io::Error| -> Error {
+        match cause.kind() {
+            // The kinds of a decompressor, but never of the operating system.
+            io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+                problem::Problem::Gzip { cause }.into()
+            }
+            _ => {
+                let action = "unpack it to the temporary folder, which TMPDIR names";
+                error::Problem::Io { action, cause }.into()
+            }
         }
-        _ => Error::Io { action: "unpack it to the temporary folder, which TMPDIR names", cause },
     };
     let mut copy = NamedTempFile::new().map_err(unpack_error)?;
     let size = io::copy(&mut from, &mut copy).map_err(unpack_error)?;

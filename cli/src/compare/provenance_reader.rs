@@ -1,10 +1,12 @@
-//! What files of Minkowski maps say of themselves, and whether it goes together.
+//! Reads from headers how Minkowski maps were made, and tells whether files go together.
 //!
 //! Only headers are read here.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{bail, ensure};
+use longan::Weight;
+use longan::measures::Quantity;
 use longan_formats::{
     self as formats, Card, CardValue, Field, FieldDescription, GridDescription, Selection, TableDescription,
     TablePlace, is_alike, units_differ,
@@ -14,13 +16,14 @@ use longan_grid::{CoordinateSystem, Map};
 use super::super::mismatch::of_coordinates;
 use super::super::options::{is_same_file, shown};
 use super::super::output::{card, integer, numbered, real};
+use super::super::quantity::of_measure;
 use super::super::regridding;
 
 /// Thresholds in standard deviations, counted back from the map's unit, are the same within this.
 const SAME_THRESHOLD: f64 = 1e-6;
 
 /// A file of Minkowski maps.
-pub(super) struct Said {
+pub(super) struct MadeFrom {
     /// The file.
     pub(super) path: PathBuf,
     /// Their Nside.
@@ -29,11 +32,11 @@ pub(super) struct Said {
     pub(super) coordinates: Option<CoordinateSystem>,
     /// Their columns.
     pub(super) columns: Vec<Column>,
-    /// What has to be the same in all files: what it is, and its value.
+    /// Facts that have to be the same in all files, each with its name and value.
     facts: Vec<(&'static str, String)>,
     /// The unit in which thresholds were given: sigma, or the map's.
     threshold_unit: String,
-    /// How masks were applied: what it is, and its value.
+    /// How masks were applied, each setting with its name and value.
     masking: Vec<(&'static str, String)>,
     /// Nside of the map that was measured.
     pub(super) input_nside: String,
@@ -51,32 +54,28 @@ pub(super) struct Column {
     /// The measure, with window and threshold where the file has several, as in EVQ_WINDOW_4_THRESHOLD_1.
     pub(super) name: String,
     pub(super) unit: String,
+    pub(super) quantity: Quantity,
     /// Radius of its windows in degrees, where the file tells.
     pub(super) window: Option<f64>,
     /// The thresholds that it is of, in the unit in which they were given.
     thresholds: Vec<f64>,
     /// The FITS extension that it is in.
     hdu: Option<usize>,
-    /// What it is called there.
+    /// The name of the map there.
     field: String,
 }
 
 impl Column {
     /// One that is still to be made.
-    pub(super) fn to_be(name: String, unit: &str) -> Self {
+    pub(super) fn to_be(name: String, unit: &str, quantity: Quantity) -> Self {
         let field = name.clone();
-        Column { name, unit: unit.to_owned(), window: None, thresholds: Vec::new(), hdu: None, field }
-    }
-
-    /// Whether it holds angles, which have neither a mean nor an order.
-    pub(super) fn is_direction(&self) -> bool {
-        self.unit == "deg" || self.measure().to_ascii_uppercase().ends_with("DIRECTION")
+        Column { name, unit: unit.to_owned(), quantity, window: None, thresholds: Vec::new(), hdu: None, field }
     }
 
     /// Refuses what cannot be compared.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         ensure!(
-            !self.is_direction(),
+            self.quantity.has_mean(),
             "{} is an angle, of which there is no mean or order; compare other measures",
             self.name
         );
@@ -125,10 +124,10 @@ impl Column {
     }
 }
 
-/// What begins the names of windows and thresholds in those of columns.
+/// The beginnings of the names of windows and thresholds in those of columns.
 const PARTS: [&str; 2] = ["_WINDOW_", "_THRESHOLD_"];
 
-/// What differs between two files.
+/// The complaint that a fact differs between two files.
 fn differ(what: &str, (path, mine): (&Path, &str), (other, others): (&Path, &str)) -> String {
     let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
     format!(
@@ -140,8 +139,8 @@ fn differ(what: &str, (path, mine): (&Path, &str), (other, others): (&Path, &str
     )
 }
 
-impl Said {
-    /// What a file says of itself; nothing where it holds no Minkowski map of longan.
+impl MadeFrom {
+    /// The provenance that a file states; nothing where it holds no Minkowski map of longan.
     ///
     /// # Errors
     /// Where it cannot be read, or its maps have several times.
@@ -165,7 +164,7 @@ impl Said {
         let formulas: Vec<String> =
             table.cards.iter().filter(|card| card.key.starts_with("FORMUL")).map(|card| words(&card.value)).collect();
         let sigma = word("THRUNIT") == "sigma";
-        Said {
+        MadeFrom {
             path: path.to_owned(),
             nside,
             coordinates,
@@ -190,8 +189,8 @@ impl Said {
     /// Whether another file was made in the same way.
     ///
     /// # Errors
-    /// What differs, with both files and both values.
-    pub(super) fn check(&self, other: &Said, ignore_coordsys: bool) -> anyhow::Result<()> {
+    /// Where a fact differs: the fact, both files and both values.
+    pub(super) fn check(&self, other: &MadeFrom, ignore_coordsys: bool) -> anyhow::Result<()> {
         let (path, other_path) = (&*self.path, &*other.path);
         for (what, mine) in &self.facts {
             let others = other.facts.iter().find(|(same, _)| same == what).map_or("", |(_, value)| value);
@@ -213,8 +212,8 @@ impl Said {
         pairs.into_iter().try_for_each(|(column, others)| column.check_same(path, others, other_path, unit))
     }
 
-    /// What is different about the masks of another file, both sides named; nothing where there is no difference.
-    pub(super) fn masked_otherwise(&self, other: &Said) -> Option<String> {
+    /// The differences from the masks of another file, both sides named; nothing where there is none.
+    pub(super) fn masked_otherwise(&self, other: &MadeFrom) -> Option<String> {
         let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
         let same = |mine: &str, others: &str| {
             mine == others || !mine.is_empty() && !others.is_empty() && is_same_file(mine.as_ref(), others.as_ref())
@@ -304,6 +303,7 @@ fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
     let all: Vec<f64> =
         word("THRESHOLDS").split(',').map_while(|x| x.split_whitespace().next()?.parse().ok()).collect();
     let windows: Vec<f64> = word("WINDOW").split(',').filter_map(|window| window.trim().parse().ok()).collect();
+    let weight = if word("WEIGHT") == "curvature" { Weight::Curvature } else { Weight::Length };
     let column = |field: &FieldDescription| {
         let (hdu, name, own) = match &table.place {
             TablePlace::Hdu { hdu, name } => {
@@ -329,7 +329,8 @@ fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
             None => given.clone(),
         };
         let unit = field.unit.clone().unwrap_or_default();
-        Column { name, unit, window, thresholds, hdu, field: field_name }
+        let quantity = of_measure(field.quantity.as_ref(), &name, &unit).weighted(weight);
+        Column { name, unit, quantity, window, thresholds, hdu, field: field_name }
     };
     table.fields.iter().map(column).collect()
 }
@@ -387,7 +388,7 @@ fn repeated(table: &TableDescription, columns: &[Column]) -> Vec<Card> {
     cards
 }
 
-/// The file that a file's maps were made of, as their header names it.
+/// The name of the file that a file's maps were made of, from their header.
 pub(super) fn made_of(path: &Path) -> anyhow::Result<Option<String>> {
     Ok(formats::describe(path)?.tables.first().and_then(|table| table.card("INFILE")).map(words))
 }

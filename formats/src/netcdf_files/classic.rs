@@ -2,13 +2,31 @@
 //!
 //! libnetcdf reads zeros beyond the end of such a file, and may crash on a damaged header. So the header is looked at
 //! here first, as the NetCDF file format specification has it (appendix B of the NetCDF User's Guide): for whether it
-//! makes sense and where the data end. What it says is left to libnetcdf.
+//! makes sense and where the data end. The content of the header is left to libnetcdf.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-use crate::Error;
+use crate::error::{self, Error, ErrorKind, Reason};
+
+/// A NetCDF 3 file that is not whole.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error("the NetCDF header is damaged or cut short; fetch the file again")]
+    Header,
+    #[error("the header promises {needed} bytes but the file ends after {found}; it is cut short, so fetch it again")]
+    Truncated { needed: u128, found: u64 },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Header => ErrorKind::Corrupt,
+            Problem::Truncated { .. } => ErrorKind::Truncated,
+        }
+    }
+}
 
 /// Tags of the lists in the header.
 const DIMENSIONS: u32 = 10;
@@ -36,11 +54,13 @@ pub(super) fn check(path: &Path) -> Result<(), Error> {
     if !recognises(&magic) {
         return Ok(());
     }
-    let needed = Header { from: file, version: magic[3] }.end_of_data().map_err(|cause| match cause.kind() {
-        io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => Error::NetcdfHeader,
-        _ => Error::Io { action: "read it", cause },
+    let needed = Header { from: file, version: magic[3] }.end_of_data().map_err(|cause| -> Error {
+        match cause.kind() {
+            io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => Problem::Header.into(),
+            _ => error::Problem::Io { action: "read it", cause }.into(),
+        }
     })?;
-    if needed > u128::from(found) { Err(Error::NetcdfTruncated { needed, found }) } else { Ok(()) }
+    if needed > u128::from(found) { Err(Problem::Truncated { needed, found }.into()) } else { Ok(()) }
 }
 
 /// A header that is being read.

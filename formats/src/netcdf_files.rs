@@ -1,6 +1,6 @@
 //! NetCDF files as a [`Dataset`]: NetCDF 3 in its three variants, NetCDF 4, and HDF5 files that are like it.
 //!
-//! The calls are left to [`crate::libnetcdf`], what names and attributes mean to [`crate::cf`], what a map is to
+//! The calls are left to [`crate::libnetcdf`], the meaning of names and attributes to [`crate::cf`], the maps to
 //! [`crate::interpret`]. [`classic`] sees to it that a file which is cut short is noticed.
 
 mod classic;
@@ -12,9 +12,27 @@ use std::rc::Rc;
 
 use netcdf_sys as sys;
 
-use crate::dataset::{Array, Attribute, Dataset, Dimension, Kind, Variable};
+use crate::adapter::{Adapter, MapSeries};
+use crate::dataset::{self, Array, Attribute, Dataset, Dimension, Kind, Variable};
+use crate::describe::Description;
+use crate::error::{Error, ErrorKind, Reason};
+use crate::interpret;
 use crate::libnetcdf::{NetcdfReader, Part, VariableHead};
-use crate::{Adapter, Description, Error, Maps, Selection, interpret};
+use crate::request::Selection;
+
+/// A number beyond those of 64 bits with a sign.
+#[derive(Debug, thiserror::Error)]
+#[error("variable '{variable}' holds {value}, beyond 2^63 - 1; store it as a signed or a real number")]
+struct LargeNumber {
+    variable: String,
+    value: u64,
+}
+
+impl Reason for LargeNumber {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Unsupported
+    }
+}
 
 /// Steps of chunked variables are read together up to this many bytes: 512 MiB.
 const BLOCK_MAX: usize = 1 << 29;
@@ -25,7 +43,7 @@ pub(crate) struct NetcdfFile {
     /// The groups' paths and attributes.
     groups: Vec<(String, Vec<(String, Attribute)>)>,
     variables: Vec<Variable>,
-    /// What libnetcdf knows of the variables, in the same order.
+    /// The heads of the variables as libnetcdf knows them, in the same order.
     heads: Vec<VariableHead>,
     /// The steps that were read last, where chunks hold several.
     kept: RefCell<Option<Block>>,
@@ -57,7 +75,7 @@ impl Adapter for Netcdf {
         Ok(Description { format: self.name(), tables })
     }
 
-    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
         interpret::open(Rc::new(NetcdfFile::open(path)?), selection)
     }
 }
@@ -105,9 +123,8 @@ impl NetcdfFile {
             Kind::Real32 | Kind::Real64 => self.reader.read_real(head, &part).map(Array::Real),
             Kind::Integer { bits: 64, signed: false } => {
                 let values = self.reader.read_unsigned(head, &part)?;
-                let whole =
-                    |value| i64::try_from(value).map_err(|_| Error::LargeNumber { variable: variable.path(), value });
-                values.into_iter().map(whole).collect::<Result<_, _>>().map(Array::Whole)
+                let whole = |value| i64::try_from(value).map_err(|_| LargeNumber { variable: variable.path(), value });
+                Ok(Array::Whole(values.into_iter().map(whole).collect::<Result<_, _>>()?))
             }
             Kind::Integer { .. } => self.reader.read_whole(head, &part).map(Array::Whole),
             Kind::Text if head.kind == sys::NC_CHAR => {
@@ -119,13 +136,13 @@ impl NetcdfFile {
                 self.reader.read_characters(head, &part, width).map(Array::Text)
             }
             Kind::Text => self.reader.read_strings(head, &part).map(Array::Text),
-            Kind::Other => Err(no_field(variable)),
+            Kind::Other => Err(no_field(variable).into()),
         }
     }
 }
 
-fn no_field(variable: &Variable) -> Error {
-    Error::VariableKind { variable: variable.path(), found: "neither numbers nor text" }
+fn no_field(variable: &Variable) -> dataset::Problem {
+    dataset::Problem::VariableKind { variable: variable.path(), found: "neither numbers nor text" }
 }
 
 /// The dimension along which more than these ranges is to be read, and from where to where: that of steps where the
@@ -191,7 +208,7 @@ impl Dataset for NetcdfFile {
             *kept = None;
             match self.part(variable, head, &together) {
                 Ok(values) => *kept = Some(Block { variable: number, ranges: together, values }),
-                Err(Error::VariableMemory { .. }) => {}
+                Err(error) if error.kind() == ErrorKind::NoMemory => {}
                 Err(error) => return Err(error),
             }
         }
@@ -202,7 +219,7 @@ impl Dataset for NetcdfFile {
     }
 }
 
-/// What a type of NetCDF holds.
+/// The kind of values of a type of NetCDF.
 fn kind(kind: sys::nc_type) -> Kind {
     let integer = |bits, signed| Kind::Integer { bits, signed };
     match kind {

@@ -33,7 +33,5 @@ impl Form {
 
 /// Writes a file, all or nothing.
 pub(crate) fn save(path: &Path, overwrite: bool, bytes: &[u8]) -> Result<(), Error> {
-    formats::save(path, overwrite, |temporary| {
-        std::fs::write(temporary, bytes).map_err(|cause| Error::Io { action: "write it", cause })
-    })
+    formats::save(path, overwrite, |temporary| std::fs::write(temporary, bytes).map_err(Error::io("write it")))
 }

@@ -1,14 +1,18 @@
 //! Surfaces in PLY files, text or binary: the adapter that reads them.
 //!
-//! Nothing is believed of the header but what the file's size bears out. How a surface becomes a map is left to
-//! [`crate::surface`].
+//! Nothing is believed of the header but what the file's size bears out. The way from a surface to a map is left to
+//! [`longan_grid::Surface`].
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use crate::columns::{self, Column, shown};
-use crate::{About, Adapter, Description, Error, GridDescription, Maps, Room, Selection};
+use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate};
+use crate::columns::{self, Column};
+use crate::describe::{Description, GridDescription};
+use crate::error::{self, Error, ErrorKind, Reason};
+use crate::request::Selection;
+use crate::text::shortened;
 use longan_grid::directions::FARTHEST;
 use longan_grid::{Map, Regrid, Sphere, Time, UNSEEN, is_bad};
 use longan_grid::{Surface, SurfaceSummary};
@@ -47,6 +51,34 @@ const NO_VALUES: [&str; 27] = [
     "flags",
 ];
 
+/// A PLY file that holds no surface with values.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error("line {line} of the header is '{text}', which is not {expected}; correct it")]
+    Header { line: usize, text: String, expected: &'static str },
+    #[error("this PLY file has no {missing}; save it as a surface of triangles with a value at each vertex")]
+    Lacks { missing: &'static str },
+    #[error(
+        "the file ends after {found} of {count} entries of '{element}'; it is cut short or its header is wrong, so fetch it again"
+    )]
+    Truncated { element: String, found: u64, count: u64 },
+    #[error(
+        "face {face} (from 0) has vertex {vertex}, but the file has {vertices} vertices, numbered from 0; correct the faces"
+    )]
+    FaceVertex { face: u64, vertex: f64, vertices: u64 },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::Header { .. } => ErrorKind::Corrupt,
+            Problem::Lacks { .. } => ErrorKind::NoMap,
+            Problem::Truncated { .. } => ErrorKind::Truncated,
+            Problem::FaceVertex { .. } => ErrorKind::Invalid,
+        }
+    }
+}
+
 /// The adapter for surfaces in PLY files.
 pub(crate) struct SurfacePly;
 
@@ -76,37 +108,37 @@ impl Adapter for SurfacePly {
         Ok(columns::describe(self.name(), grid, &columns))
     }
 
-    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
         columns::check(selection)?;
         let mut input = BufReader::new(File::open(path).map_err(Error::io("open it"))?);
         let header = Header::parse(&mut input)?;
         let mut columns = header.columns()?;
         let column = columns.swap_remove(columns::choose(&columns, selection.field.as_ref())?);
         let surface = header.surface(input, &column.name)?;
-        Ok(Box::new(One { surface, name: column.name, nside: selection.nside, regrid: selection.regrid.clone() }))
+        Ok(Box::new(SingleMap { surface, name: column.name, nside: selection.nside, regrid: selection.regrid.clone() }))
     }
 }
 
 /// The one map of a surface.
-struct One {
+struct SingleMap {
     surface: Surface,
     name: String,
     nside: Option<usize>,
     regrid: Regrid,
 }
 
-impl Maps for One {
+impl MapSeries for SingleMap {
     fn times(&self) -> &[Time] {
         &[]
     }
 
     fn about(&self) -> About {
-        About { name: self.name.clone(), unit: None, coordinates: None, sphere: Sphere::Body }
+        About { name: self.name.clone(), unit: None, coordinates: None, sphere: Sphere::Body, quantity: None }
     }
 
-    fn room(&self) -> Option<Room> {
+    fn memory(&self) -> Option<MemoryEstimate> {
         // Position and value of a vertex, its two triangles, and all as seen from the centre, with boxes about triangles.
-        Room::of_points(self.nside, self.surface.vertices.len(), 512)
+        MemoryEstimate::of_points(self.nside, self.surface.vertices.len(), 512)
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
@@ -120,7 +152,7 @@ impl Maps for One {
     }
 }
 
-/// What a header promises.
+/// The promises of a header.
 struct Header {
     format: Format,
     elements: Vec<Element>,
@@ -128,7 +160,7 @@ struct Header {
     lines: usize,
 }
 
-/// How numbers are written.
+/// The way in which numbers are written.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Format {
     Text,
@@ -143,7 +175,7 @@ struct Element {
     properties: Vec<Property>,
 }
 
-/// What each thing of a kind has.
+/// A property that each thing of a kind has.
 struct Property {
     name: String,
     kind: Kind,
@@ -151,7 +183,7 @@ struct Property {
     list: Option<Kind>,
 }
 
-/// How a number is stored in a binary file.
+/// The storage of a number in a binary file.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     I8,
@@ -212,11 +244,12 @@ impl Header {
             let mut line = Vec::new();
             input.take(LONGEST).read_until(b'\n', &mut line).map_err(Error::io("read it"))?;
             if line.pop() != Some(b'\n') {
-                return Err(Error::CutShort { action: "find the end of the header".to_owned() });
+                let action = "find the end of the header".to_owned();
+                return Err(error::Problem::CutShort { action }.into());
             }
             lines += 1;
             let text = String::from_utf8_lossy(&line);
-            let wrong = |expected| Error::PlyHeader { line: lines, text: shown(text.trim()), expected };
+            let wrong = |expected| Problem::Header { line: lines, text: shortened(text.trim()), expected };
             match text.split_whitespace().collect::<Vec<_>>()[..] {
                 [] | ["comment" | "obj_info", ..] => {}
                 ["ply"] if lines == 1 => {}
@@ -226,13 +259,14 @@ impl Header {
                         "binary_little_endian" => Format::LittleEndian,
                         "binary_big_endian" => Format::BigEndian,
                         _ => {
-                            return Err(wrong("'ascii', 'binary_little_endian' or 'binary_big_endian' with a version"));
+                            let expected = "'ascii', 'binary_little_endian' or 'binary_big_endian' with a version";
+                            return Err(wrong(expected).into());
                         }
                     });
                 }
                 ["element", name, count] => {
                     if elements.iter().any(|e| e.name == name) {
-                        return Err(wrong("an element that the file has not yet"));
+                        return Err(wrong("an element that the file has not yet").into());
                     }
                     let count = count.parse().map_err(|_| wrong("'element', a name and a number of entries"))?;
                     elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
@@ -246,15 +280,15 @@ impl Header {
                     let (kind, list) = kinds.ok_or_else(|| wrong("'property', a type such as 'float' and a name"))?;
                     let element = elements.last_mut().ok_or_else(|| wrong("after an element"))?;
                     if element.properties.iter().any(|p| p.name == name) {
-                        return Err(wrong("a property that its element has not yet"));
+                        return Err(wrong("a property that its element has not yet").into());
                     }
                     element.properties.push(Property { name: name.to_owned(), kind, list });
                 }
                 ["end_header"] => break,
-                _ => return Err(wrong("a line of a PLY header")),
+                _ => return Err(wrong("a line of a PLY header").into()),
             }
         }
-        let format = format.ok_or(Error::PlyLacks { missing: "line that says its format" })?;
+        let format = format.ok_or(Problem::Lacks { missing: "line that says its format" })?;
         Ok(Header { format, elements, lines })
     }
 
@@ -264,8 +298,8 @@ impl Header {
     }
 
     /// The properties of vertices that are one number each, once it is clear that there is a surface.
-    fn columns(&self) -> Result<Vec<Column>, Error> {
-        let vertex = self.element("vertex").ok_or(Error::PlyLacks { missing: "vertices" })?;
+    fn columns(&self) -> Result<Vec<Column>, Problem> {
+        let vertex = self.element("vertex").ok_or(Problem::Lacks { missing: "vertices" })?;
         let column = |p: &Property| Column {
             heading: p.name.clone(),
             name: p.name.clone(),
@@ -274,10 +308,10 @@ impl Header {
         };
         let columns: Vec<Column> = vertex.properties.iter().filter(|p| p.list.is_none()).map(column).collect();
         if !["x", "y", "z"].iter().all(|name| columns.iter().any(|c| c.name == *name)) {
-            return Err(Error::PlyLacks { missing: "positions x, y and z of its vertices" });
+            return Err(Problem::Lacks { missing: "positions x, y and z of its vertices" });
         }
         let face = self.element("face").filter(|face| face.properties.iter().any(Property::is_corners));
-        face.ok_or(Error::PlyLacks { missing: "faces" })?;
+        face.ok_or(Problem::Lacks { missing: "faces" })?;
         Ok(columns)
     }
 
@@ -295,19 +329,16 @@ impl Header {
                     _ => body.skip(element, entry)?,
                 };
                 if read.is_none() {
-                    return Err(Error::PlyTruncated {
-                        element: shown(&element.name),
-                        found: entry,
-                        count: element.count,
-                    });
+                    let (element, count) = (shortened(&element.name), element.count);
+                    return Err(Problem::Truncated { element, found: entry, count }.into());
                 }
             }
         }
         if surface.triangles.is_empty() {
-            return Err(Error::PlyLacks { missing: "faces" });
+            return Err(Problem::Lacks { missing: "faces" }.into());
         }
         if surface.values.iter().all(|value| value.is_nan()) {
-            return Err(Error::NoValues { column: shown(values) });
+            return Err(columns::Problem::NoValues { column: shortened(values) }.into());
         }
         Ok(surface)
     }
@@ -340,12 +371,13 @@ impl<R: BufRead> Body<R> {
             let Some(number) = self.number(property.kind, &property.name)? else { return Ok(None) };
             if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == property.name) {
                 if number.is_nan() || number.abs() > FARTHEST {
-                    return Err(Error::BadNumber {
+                    return Err(columns::Problem::BadNumber {
                         place: format!("vertex {entry} (from 0)"),
                         column: property.name.clone(),
                         text: number.to_string(),
                         expected: "a number from -1e100 to 1e100",
-                    });
+                    }
+                    .into());
                 }
                 position[axis] = number;
             }
@@ -373,7 +405,7 @@ impl<R: BufRead> Body<R> {
                 Some(_) if !property.is_corners() => self.list(property, entry, |_| Ok(()))?,
                 Some(_) => self.list(property, entry, |number| {
                     if !(number >= 0.0 && number < vertices as f64 && number.fract() == 0.0) {
-                        return Err(Error::FaceVertex { face: entry, vertex: number, vertices });
+                        return Err(Problem::FaceVertex { face: entry, vertex: number, vertices }.into());
                     }
                     let corner = number as usize;
                     if let (Some(first), Some(last)) = (first, last) {
@@ -419,12 +451,13 @@ impl<R: BufRead> Body<R> {
             return Ok(None);
         };
         if !(length >= 0.0 && length.fract() == 0.0) {
-            return Err(Error::BadNumber {
+            return Err(columns::Problem::BadNumber {
                 place: format!("entry {entry} (from 0)"),
-                column: shown(&property.name),
+                column: shortened(&property.name),
                 text: length.to_string(),
                 expected: "the length of a list",
-            });
+            }
+            .into());
         }
         for _ in 0..length as u64 {
             let Some(number) = self.number(property.kind, &property.name)? else { return Ok(None) };
@@ -439,12 +472,13 @@ impl<R: BufRead> Body<R> {
             let word = self.word()?;
             let number = word.as_deref().map(|word| std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()));
             return match number {
-                Some(None) => Err(Error::BadNumber {
+                Some(None) => Err(columns::Problem::BadNumber {
                     place: format!("line {}", self.line),
-                    column: shown(name),
-                    text: shown(&String::from_utf8_lossy(&word.unwrap_or_default())),
+                    column: shortened(name),
+                    text: shortened(&String::from_utf8_lossy(&word.unwrap_or_default())),
                     expected: "a number",
-                }),
+                }
+                .into()),
                 number => Ok(number.flatten()),
             };
         }

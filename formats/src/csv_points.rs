@@ -8,13 +8,42 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use crate::columns::{self, Column, shown};
-use crate::{About, Adapter, Description, Error, GridDescription, Maps, Room, Selection};
+use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate};
+use crate::columns::{self, Column};
+use crate::describe::{Description, GridDescription};
+use crate::error::{self, Error, ErrorKind, Reason};
+use crate::request::Selection;
+use crate::text::shortened;
 use longan_grid::directions::{self, FARTHEST, at, from_centre};
 use longan_grid::{CoordinateSystem, Map, Regrid, Regridded, Sphere, Time, UNSEEN, is_bad};
 use longan_grid::{Points, PointsSummary};
 
-/// What may part cells.
+/// Columns or rows of text that do not make points.
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error(
+        "no line of this text names columns of longitude and latitude, or of x, y and z; add a line such as 'lon,lat,value' before the numbers"
+    )]
+    NoPointColumns,
+    #[error("columns '{first}' and '{second}' could both be the {coordinate}; rename one of them")]
+    TwoCoordinates { coordinate: &'static str, first: String, second: String },
+    #[error("the angles in column '{column}' are in radians; convert them to degrees")]
+    RadianColumn { column: String },
+    #[error("{place} has {found} values but there are {expected} columns; correct it")]
+    RowLength { place: String, found: usize, expected: usize },
+}
+
+impl Reason for Problem {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Problem::NoPointColumns => ErrorKind::NoMap,
+            Problem::TwoCoordinates { .. } | Problem::RowLength { .. } => ErrorKind::Invalid,
+            Problem::RadianColumn { .. } => ErrorKind::Unsupported,
+        }
+    }
+}
+
+/// The letters that may part cells.
 const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
 
 /// No line up to the header is longer than this.
@@ -53,7 +82,7 @@ impl Adapter for PointsCsv {
 
     fn recognises(&self, head: &[u8]) -> bool {
         // A table of coordinates of which either could be meant is one too, with an error of its own.
-        !head.contains(&0) && !matches!(Header::find(&mut io::Cursor::new(head)), Err(Error::NoPointColumns))
+        !head.contains(&0) && !matches!(Header::find(&mut io::Cursor::new(head)), Ok(None))
     }
 
     fn describe(&self, path: &Path) -> Result<Description, Error> {
@@ -66,17 +95,17 @@ impl Adapter for PointsCsv {
         Ok(columns::describe(self.name(), grid, &table.header.columns))
     }
 
-    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn Maps>, Error> {
+    fn open(&self, path: &Path, selection: &Selection) -> Result<Box<dyn MapSeries>, Error> {
         columns::check(selection)?;
         let table = Table::open(path)?;
         let values = columns::choose(&table.header.columns, selection.field.as_ref())?;
         let samples = table.samples(values, selection.regrid.centre)?;
-        Ok(Box::new(One { table, values, samples, nside: selection.nside, regrid: selection.regrid.clone() }))
+        Ok(Box::new(SingleMap { table, values, samples, nside: selection.nside, regrid: selection.regrid.clone() }))
     }
 }
 
 /// The one map of a table of points.
-struct One {
+struct SingleMap {
     table: Table,
     /// The column of values.
     values: usize,
@@ -85,7 +114,7 @@ struct One {
     regrid: Regrid,
 }
 
-impl Maps for One {
+impl MapSeries for SingleMap {
     fn times(&self) -> &[Time] {
         &[]
     }
@@ -102,12 +131,12 @@ impl Maps for One {
             Position::Angles { .. } if system.is_some() => Sphere::Sky,
             Position::Angles { .. } => Sphere::Earth,
         };
-        About { name, unit, coordinates: *system, sphere }
+        About { name, unit, coordinates: *system, sphere, quantity: None }
     }
 
-    fn room(&self) -> Option<Room> {
+    fn memory(&self) -> Option<MemoryEstimate> {
         // Direction and value, and the directions once more in a tree.
-        Room::of_points(self.nside, self.samples.values.len(), 128)
+        MemoryEstimate::of_points(self.nside, self.samples.values.len(), 128)
     }
 
     fn read(&mut self, _: usize) -> Result<Map, Error> {
@@ -121,7 +150,7 @@ impl Maps for One {
     }
 }
 
-/// What the text up to the numbers says.
+/// The header: the text up to the numbers.
 struct Header {
     delimiter: u8,
     columns: Vec<Column>,
@@ -147,7 +176,7 @@ impl Position {
     }
 }
 
-/// What a column may say of a point's place.
+/// The part of a point's place that a column may hold.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coordinate {
     /// By the number of its names in [`ANGLES`].
@@ -157,8 +186,8 @@ enum Coordinate {
 }
 
 impl Header {
-    /// Finds the header.
-    fn find(input: &mut impl BufRead) -> Result<Self, Error> {
+    /// Finds the header; nothing where no line names columns of points.
+    fn find(input: &mut impl BufRead) -> Result<Option<Self>, Error> {
         let mut offset = 0;
         let mut comment = Vec::new();
         loop {
@@ -169,16 +198,16 @@ impl Header {
                 comment = text.trim_ascii_start().to_vec();
             } else if !text.is_empty() || read == 0 {
                 if let Some(header) = Header::parse(text, offset + read)? {
-                    return Ok(header);
+                    return Ok(Some(header));
                 }
-                return Header::parse(&comment, offset)?.ok_or(Error::NoPointColumns);
+                return Ok(Header::parse(&comment, offset)?);
             }
             offset += read;
         }
     }
 
     /// Understands a header, if the text is one.
-    fn parse(text: &[u8], offset: u64) -> Result<Option<Self>, Error> {
+    fn parse(text: &[u8], offset: u64) -> Result<Option<Self>, Problem> {
         for delimiter in DELIMITERS {
             let mut cells = csv::ByteRecord::new();
             let mut reader = reader(text, delimiter);
@@ -239,15 +268,15 @@ fn coordinate(column: &Column) -> Option<(Coordinate, String)> {
 }
 
 /// The columns that say where a point is, if there are any.
-fn position(columns: &[Column]) -> Result<Option<(Position, Option<CoordinateSystem>)>, Error> {
+fn position(columns: &[Column]) -> Result<Option<(Position, Option<CoordinateSystem>)>, Problem> {
     let coordinates: Vec<_> = columns.iter().map(coordinate).collect();
     let only = |wanted: Coordinate, name: &'static str| {
         let mut found = (0..columns.len()).filter(|&i| coordinates[i].as_ref().is_some_and(|(c, _)| *c == wanted));
         match (found.next(), found.next()) {
-            (Some(first), Some(second)) => Err(Error::TwoCoordinates {
+            (Some(first), Some(second)) => Err(Problem::TwoCoordinates {
                 coordinate: name,
-                first: shown(&columns[first].heading),
-                second: shown(&columns[second].heading),
+                first: shortened(&columns[first].heading),
+                second: shortened(&columns[second].heading),
             }),
             (first, _) => Ok(first),
         }
@@ -261,7 +290,7 @@ fn position(columns: &[Column]) -> Result<Option<(Position, Option<CoordinateSys
         let Some((longitude, latitude)) = pair else { continue };
         for i in [longitude, latitude] {
             if coordinates[i].as_ref().is_some_and(|(_, unit)| RADIANS.contains(&unit.as_str())) {
-                return Err(Error::RadianColumn { column: shown(&columns[i].heading) });
+                return Err(Problem::RadianColumn { column: shortened(&columns[i].heading) });
             }
         }
         return Ok(Some((Position::Angles { longitude, latitude }, *system)));
@@ -286,6 +315,7 @@ impl Table {
     /// Understands the header of a table, and which of its columns hold numbers.
     fn open(path: &Path) -> Result<Self, Error> {
         let header = Header::find(&mut BufReader::new(File::open(path).map_err(Error::io("open it"))?))?;
+        let header = header.ok_or(Problem::NoPointColumns)?;
         let mut table = Table { path: path.to_owned(), header };
         // The first cell that is not missing tells.
         let mut undecided: Vec<usize> =
@@ -353,7 +383,7 @@ impl Table {
         };
         points.retain(|(_, value, _)| !value.is_nan());
         if points.is_empty() {
-            return Err(Error::NoValues { column: shown(&self.header.columns[values].name) });
+            return Err(columns::Problem::NoValues { column: shortened(&self.header.columns[values].name) }.into());
         }
         let mut samples = Points { directions: Vec::new(), values: Vec::new() };
         for (point, value, at) in points {
@@ -375,14 +405,11 @@ impl Table {
         }
         let place = || self.place(row.position().map_or(0, csv::Position::byte));
         if row.len() < columns.len() || row.iter().skip(columns.len()).any(|cell| !cell.is_empty()) {
-            return Err(Error::RowLength { place: place()?, found: row.len(), expected: columns.len() });
+            return Err(Problem::RowLength { place: place()?, found: row.len(), expected: columns.len() }.into());
         }
-        let bad = |i: usize, expected| match place() {
-            Ok(place) => {
-                let text = shown(&String::from_utf8_lossy(&row[i]));
-                Error::BadNumber { place, column: shown(&columns[i].name), text, expected }
-            }
-            Err(e) => e,
+        let bad = |i: usize, expected| -> Error {
+            let (column, text) = (shortened(&columns[i].name), shortened(&String::from_utf8_lossy(&row[i])));
+            place().map_or_else(|e| e, |place| columns::Problem::BadNumber { place, column, text, expected }.into())
         };
         let value = match number(&row[values]) {
             _ if is_missing(&row[values]) => f64::NAN,
@@ -412,7 +439,7 @@ impl Table {
     }
 }
 
-/// What a number looks like, for people.
+/// A description of numbers, for people.
 const NUMBER: &str = "a number such as -1.5";
 
 /// A cell's number.
@@ -440,6 +467,6 @@ fn reader<R: Read>(input: R, delimiter: u8) -> csv::Reader<R> {
 fn next<R: Read>(rows: &mut csv::Reader<R>, row: &mut csv::ByteRecord) -> Result<bool, Error> {
     rows.read_byte_record(row).map_err(|e| match e.into_kind() {
         csv::ErrorKind::Io(cause) => Error::io("read it")(cause),
-        _ => Error::Io { action: "read it", cause: io::ErrorKind::InvalidData.into() },
+        _ => error::Problem::Io { action: "read it", cause: io::ErrorKind::InvalidData.into() }.into(),
     })
 }

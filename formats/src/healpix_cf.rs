@@ -1,7 +1,7 @@
 //! HEALPix maps in NetCDF and Zarr, as CF 1.13 has them and as they were written before it.
 //!
-//! [`grid`] finds out how a variable's cells are numbered, [`read`] fetches values. What other dimensions, time and
-//! packing mean is left to [`crate::cf`], bytes to the [`Dataset`].
+//! [`grid`] finds out how a variable's cells are numbered, [`read`] fetches values. The meaning of other dimensions, time
+//! and packing is left to [`crate::cf`], bytes to the [`Dataset`].
 //!
 //! On an ellipsoid, HEALPix latitudes are authalic: the pixels of a map are the file's pixels, whatever the ellipsoid,
 //! and their areas are equal, but on WGS84 geodetic latitudes differ by up to 0.13 degrees from those of the sphere.
@@ -11,29 +11,49 @@ mod read;
 
 use std::rc::Rc;
 
+use crate::adapter::MapSeries;
 use crate::cf::{self, shape};
-use crate::dataset::{Dataset, Kind, Variable};
+use crate::dataset::{self, Dataset, Kind, Variable};
+use crate::describe::TableDescription;
+use crate::error::{Ask, Error, ErrorKind, Reason};
 use crate::names::is_alike;
-use crate::{Error, Field, Maps, Selection, TableDescription};
+use crate::request::{Field, Selection};
+use crate::text::spaced;
 use grid::Grid;
+
+/// A name or number that no field on a HEALPix grid has.
+#[derive(Debug, thiserror::Error)]
+#[error("there is no variable {variable}; those on a HEALPix grid are {variables}")]
+struct Unknown {
+    variable: String,
+    variables: String,
+}
+
+impl Reason for Unknown {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Unknown
+    }
+
+    fn ask(&self) -> Option<Ask> {
+        Some(Ask::Variable)
+    }
+}
 
 /// Finds the field that is selected; nothing where the dataset has no HEALPix field, or another field is named.
 ///
 /// # Errors
-/// Where it cannot be read, or has not what is selected.
-pub(crate) fn open(dataset: &Rc<dyn Dataset>, selection: &Selection) -> Result<Option<Box<dyn Maps>>, Error> {
+/// Where the field cannot be read, or a selected place is not there.
+pub(crate) fn open(dataset: &Rc<dyn Dataset>, selection: &Selection) -> Result<Option<Box<dyn MapSeries>>, Error> {
     let fields = fields(&**dataset);
     if fields.is_empty() {
         return Ok(None);
     }
     let Some(place) = choose(&**dataset, &fields, selection.field.as_ref())? else { return Ok(None) };
-    if let Some(hdu) = selection.hdu {
-        return Err(Error::NoHdus { hdu });
-    }
+    selection.without_hdu()?;
     read::open(dataset, place, selection).map(Some)
 }
 
-/// What a dataset holds on HEALPix grids; nothing where there is no such field.
+/// Describes the fields of a dataset on HEALPix grids; nothing where there is no such field.
 ///
 /// # Errors
 /// Where it cannot be read.
@@ -74,14 +94,13 @@ fn choose(dataset: &dyn Dataset, fields: &[usize], field: Option<&Field>) -> Res
         let unit = variable.text("units").map(|unit| format!(" in {unit}")).unwrap_or_default();
         format!("{} with {}{unit}", variable.path(), shape(variable))
     };
-    let list = || fields.iter().map(describe).collect::<Vec<_>>().join("; ").replace(char::is_control, " ");
-    let unknown = |field: &Field| Error::UnknownHealpix { variable: field.to_string(), variables: list() };
+    let listed = |fields: &[usize]| spaced(fields.iter().map(describe).collect::<Vec<_>>().join("; "));
+    let unknown = |field: &Field| Unknown { variable: field.to_string(), variables: listed(fields) };
+    let several = |fields| dataset::Problem::SeveralVariables { variables: listed(fields) };
     match field {
         None if fields.len() == 1 => Ok(Some(fields[0])),
-        None => Err(Error::SeveralVariables { variables: list() }),
-        Some(Field::Number(number)) => {
-            fields.get(*number).copied().map(Some).ok_or_else(|| unknown(&Field::Number(*number)))
-        }
+        None => Err(several(fields).into()),
+        Some(Field::Number(number)) => Ok(Some(*fields.get(*number).ok_or_else(|| unknown(&Field::Number(*number)))?)),
         Some(Field::Name(name)) => {
             let exact = |variable: &Variable| variable.name == *name || variable.path() == *name;
             let alike = |variable: &Variable| is_alike(&variable.name, name) || is_alike(&variable.path(), name);
@@ -93,11 +112,8 @@ fn choose(dataset: &dyn Dataset, fields: &[usize], field: Option<&Field>) -> Res
             match found[..] {
                 [place] => Ok(Some(place)),
                 [] if variables.iter().any(alike) => Ok(None),
-                [] => Err(unknown(&Field::Name(name.clone()))),
-                [..] => {
-                    let variables = found.iter().map(describe).collect::<Vec<_>>().join("; ");
-                    Err(Error::SeveralVariables { variables: variables.replace(char::is_control, " ") })
-                }
+                [] => Err(unknown(&Field::Name(name.clone())).into()),
+                ref found => Err(several(found).into()),
             }
         }
     }
