@@ -1,4 +1,4 @@
-//! A measure of one's own: the shape index β = (ψ_0 − |ψ_2|)/(ψ_0 + |ψ_2|), the inverse of EVQ, 1 for round bodies.
+//! A measure of your own: the shape index β = (ψ_0 − |ψ_2|)/(ψ_0 + |ψ_2|), the inverse of EVQ, 1 for round bodies.
 //!
 //! Run with `cargo run --release --example own_measure`.
 

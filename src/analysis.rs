@@ -31,6 +31,16 @@ pub enum ThresholdUnit {
     Value,
 }
 
+impl ThresholdUnit {
+    /// The name in options, headers and recipes: `sigma` or `value`.
+    pub fn name(self) -> &'static str {
+        match self {
+            ThresholdUnit::Sigma => "sigma",
+            ThresholdUnit::Value => "value",
+        }
+    }
+}
+
 /// How a field is analysed. The default is the analysis of the paper.
 #[derive(Clone, Debug)]
 pub struct Analysis {
@@ -152,7 +162,7 @@ pub enum AnalysisError {
     /// A measure of tensors of another weight.
     #[error(
         "the measure '{measure}' is defined for tensors weighted by {}, and these are weighted by {}; choose the other weight",
-        named(*weight), named(other(*weight))
+        weight.name(), other(*weight).name()
     )]
     Weight {
         /// The measure.
@@ -180,13 +190,6 @@ impl From<Stopped> for AnalysisError {
 impl From<Infallible> for AnalysisError {
     fn from(never: Infallible) -> Self {
         match never {}
-    }
-}
-
-fn named(weight: Weight) -> &'static str {
-    match weight {
-        Weight::Length => "length",
-        Weight::Curvature => "curvature",
     }
 }
 
@@ -316,10 +319,7 @@ impl Analysis {
             return Err(AnalysisError::NoMeasure);
         }
         let selection = self.selection(measures)?;
-        let of_each = match self.by_threshold {
-            true => thresholds.values().iter().map(|&t| Thresholds::new(vec![t])).collect::<Result<_, _>>()?,
-            false => vec![thresholds.clone()],
-        };
+        let of_each = self.of_each_block(&thresholds);
         let columns = measures.len();
         let relative: Vec<bool> = measures.iter().map(|measure| measure.as_ref().is_relative()).collect();
         let radii: Vec<f64> = self.windows.iter().map(|degrees| degrees.to_radians()).collect();
@@ -372,7 +372,13 @@ impl Analysis {
         Ok(MinkowskiMaps { grid, of_map, blocks })
     }
 
+    /// The thresholds of each block of one window.
+    fn of_each_block(&self, thresholds: &Thresholds) -> Vec<Thresholds> {
+        if self.by_threshold { thresholds.each().collect() } else { vec![thresholds.clone()] }
+    }
+
     /// The result for a field that has no shape to measure, masked everywhere or constant: nothing but undefined values.
+    /// The blocks have the thresholds as they were given, for there may be none in the field's unit.
     ///
     /// # Errors
     /// See [`check`](Self::check); [`AnalysisError::Grid`] for a number of values that no grid has.
@@ -382,16 +388,17 @@ impl Analysis {
     {
         let map = map.try_into().map_err(Into::into)?;
         let grid = self.check(map.grid())?;
-        let each = if self.by_threshold { self.thresholds.values().len() } else { 1 };
-        let block = |window: f64| Block {
+        let of_each = self.of_each_block(&self.thresholds);
+        let block = |window: f64, thresholds: &Thresholds| Block {
             window,
-            thresholds: self.thresholds.clone(),
+            thresholds: thresholds.clone(),
             measures: measures.iter().map(|measure| measure.as_ref().name()).collect(),
             values: Array2::from_elem((measures.len(), grid.pixels()), f64::NAN),
             masked: grid.pixels(),
             counts: SummationCounts::default(),
         };
-        let blocks = self.windows.iter().flat_map(|&window| std::iter::repeat_n(block(window), each)).collect();
+        let blocks = self.windows.iter().flat_map(|&window| of_each.iter().map(move |each| (window, each)));
+        let blocks = blocks.map(|(window, each)| block(window, each)).collect();
         Ok(MinkowskiMaps { grid, of_map: statistics(map.values()).unwrap_or(Statistics::NOTHING), blocks })
     }
 

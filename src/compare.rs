@@ -23,6 +23,8 @@
 //! # Ok::<(), longan::compare::ComparisonError>(())
 //! ```
 
+use std::convert::Infallible;
+
 mod comparison;
 mod ensemble;
 mod peaks;
@@ -35,12 +37,9 @@ pub use peaks::{Peak, peaks};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ComparisonError {
-    /// Data that is no map.
-    #[error("{pixels} values are not a HEALPix map: no Nside has 12 Nside² = {pixels} pixels")]
-    NotHealpix {
-        /// Number of values.
-        pixels: usize,
-    },
+    /// Data that is on no grid.
+    #[error(transparent)]
+    Grid(#[from] longan_grid::Error),
     /// A simulation on another grid.
     #[error("a simulation of {found} pixels cannot be compared with data of {expected}; bring both to the same Nside")]
     Pixels {
@@ -66,4 +65,10 @@ pub enum ComparisonError {
         /// Simulations of the second pass, the one refused among them.
         second: usize,
     },
+}
+
+impl From<Infallible> for ComparisonError {
+    fn from(never: Infallible) -> Self {
+        match never {}
+    }
 }

@@ -31,6 +31,16 @@ pub enum Body {
     Below,
 }
 
+impl Body {
+    /// The name in options, headers and recipes: `above` or `below`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Body::Above => "above",
+            Body::Below => "below",
+        }
+    }
+}
+
 /// A field on the grid and the thresholds at which to contour it.
 #[derive(Debug)]
 pub struct Field<'a> {

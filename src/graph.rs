@@ -31,10 +31,11 @@ mod ensemble;
 mod error;
 mod ordinate;
 
+use std::ops::ControlFlow;
+
 use longan_grid::{Healpix, Map};
 use longan_measures::Catalogue;
 use ndarray::{Array1, Array2};
-use std::ops::ControlFlow;
 
 pub use curves::{Curve, Curves};
 pub use ensemble::{BAND_68, BAND_95, Ensemble};
@@ -125,8 +126,8 @@ impl Graph {
     /// Checks all that can be checked without a map's values; the grid of the windows' centres.
     ///
     /// # Errors
-    /// [`GraphError::Nothing`], [`GraphError::Windows`], [`GraphError::NoDensity`], [`GraphError::Analysis`], and [`GraphError::NoWindow`] where
-    /// the region is too small for the grid.
+    /// [`GraphError::Nothing`], [`GraphError::Windows`], [`GraphError::NoDensity`], [`GraphError::Analysis`], and
+    /// [`GraphError::NoWindow`] where the region is too small for the grid.
     pub fn check(&self, map: Healpix) -> Result<Healpix, GraphError> {
         if self.ordinates.is_empty() {
             return Err(GraphError::Nothing);
@@ -147,7 +148,8 @@ impl Graph {
 
     /// The curves of a map: one pass over it for all densities, and one for all windows.
     ///
-    /// `progress` is told the share done, from 0 to 1, and says whether to go on. The result does not depend on the number of threads.
+    /// `progress` is told the share done, from 0 to 1, and says whether to go on. The result does not depend on the number
+    /// of threads.
     ///
     /// # Errors
     /// Those of [`check`](Self::check); [`GraphError::Masked`], [`GraphError::NoPixel`] and [`GraphError::NoGaussian`].

@@ -8,9 +8,7 @@ use longan_grid::Healpix;
 use longan_measures::{Measure, Origin};
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::{Analysis, AnalysisError, ThresholdUnit};
-use crate::contour::Body;
-use crate::moments::Weight;
+use crate::analysis::{Analysis, AnalysisError};
 use crate::window::Summation;
 
 /// Goes up whenever the same recipe gives other values than before: 2 since curvature sits at vertices and all moments
@@ -113,18 +111,14 @@ impl Analysis {
             };
             MeasureRecipe { name: measure.name(), formula, plugin }
         };
-        let threshold_unit = match self.threshold_unit {
-            ThresholdUnit::Sigma => "sigma",
-            ThresholdUnit::Value => "value",
-        };
         Ok(Recipe {
             revision: REVISION,
             measures: measures.iter().map(|m| measure(m.as_ref())).collect(),
             windows: self.windows.clone(),
             thresholds: self.thresholds.values().to_vec(),
-            threshold_unit: threshold_unit.to_owned(),
-            body: if self.body == Body::Above { "above" } else { "below" }.to_owned(),
-            weight: if self.weight == Weight::Length { "length" } else { "curvature" }.to_owned(),
+            threshold_unit: self.threshold_unit.name().to_owned(),
+            body: self.body.name().to_owned(),
+            weight: self.weight.name().to_owned(),
             nside: field.nside(),
             nside_out: output.nside(),
             max_masked: self.max_masked,
@@ -169,9 +163,11 @@ impl Recipe {
 
 #[cfg(test)]
 mod tests {
-    use longan_measures::{Formula, find};
+    use longan_measures::{Formula, Weight, find};
 
     use super::*;
+    use crate::analysis::ThresholdUnit;
+    use crate::contour::Body;
 
     fn recipe(analysis: &Analysis) -> Recipe {
         analysis.recipe(Healpix::new(64).unwrap(), &[find("evq").unwrap()]).unwrap()

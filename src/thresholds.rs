@@ -95,6 +95,11 @@ impl Thresholds {
         }
     }
 
+    /// Each threshold as a set of its own.
+    pub(crate) fn each(&self) -> impl Iterator<Item = Self> {
+        self.0.iter().map(|&threshold| Thresholds(vec![threshold]))
+    }
+
     /// The paper's set: 13 from −3 to 3, to be taken in standard deviations.
     pub fn standard() -> Self {
         Thresholds((-6..=6).map(|i| f64::from(i) / 2.0).collect())

@@ -6,7 +6,7 @@ use longan::totals::{Totals, totals};
 use longan::window::{MovingWindows, Summation};
 use longan::{Analysis, Body, Healpix, Map, ThresholdUnit, Thresholds};
 
-use longan_support::{difference, masked, noise, turned};
+use longan_support::{difference, masked, noise, rows, turned};
 
 const NSIDES: [usize; 9] = [1, 2, 3, 4, 5, 8, 13, 16, 64];
 
@@ -101,7 +101,7 @@ fn moments_by(
 ) -> Vec<Vec<f64>> {
     let selection =
         Selection { area: true, length: true, curvature: true, ranks: (1..=6).collect(), weight, by_threshold: false };
-    MovingWindows {
+    let windows = MovingWindows {
         field: &Field::new(map.grid(), map.values(), at, body),
         selection: &selection,
         output: Healpix::new(output).unwrap(),
@@ -111,12 +111,8 @@ fn moments_by(
     .visit(4 + 2 * 6, |m, out| {
         out[..4].copy_from_slice(&[m.masked_fraction, m.area, m.length, m.curvature]);
         m.psi.iter().enumerate().for_each(|(i, p)| out[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
-    })
-    .remove(0)
-    .values[0]
-        .outer_iter()
-        .map(|row| row.to_vec())
-        .collect()
+    });
+    rows(&windows[0].values[0])
 }
 
 #[test]
@@ -208,14 +204,7 @@ fn thresholds_average() {
 
 fn analyse(threads: usize, map: &Map, analysis: &Analysis, measures: &[BuiltIn]) -> Vec<Vec<f64>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| analysis.minkowski_maps(map, measures, longan::go_on))
-        .unwrap()
-        .blocks
-        .remove(0)
-        .values
-        .outer_iter()
-        .map(|row| row.to_vec())
-        .collect::<Vec<_>>()
+    rows(&pool.install(|| analysis.minkowski_maps(map, measures, longan::go_on)).unwrap().blocks[0].values)
 }
 
 #[test]
@@ -244,15 +233,7 @@ fn masked_windows_are_masked_and_others_rescaled() {
     let with = |max_masked| {
         let analysis =
             Analysis { windows: vec![15.0], threshold_unit: ThresholdUnit::Sigma, max_masked, ..Analysis::default() };
-        analysis
-            .minkowski_maps(&map, &measures, longan::go_on)
-            .unwrap()
-            .blocks
-            .remove(0)
-            .values
-            .outer_iter()
-            .map(|row| row.to_vec())
-            .collect::<Vec<_>>()
+        rows(&analysis.minkowski_maps(&map, &measures, longan::go_on).unwrap().blocks[0].values)
     };
     let (all, some) = (with(1.0), with(0.2));
     let fraction = &all[2];

@@ -3,7 +3,7 @@ use longan::simulate::Waves;
 use longan::{Analysis, Healpix, Map, ThresholdUnit, Weight};
 use longan_formats::{self as formats, Selection};
 
-use longan_support::masked;
+use longan_support::{masked, rows};
 
 /// Every built-in measure that is neither a direction nor tells of the mask itself, with ranks 1 to 4 of families.
 fn measures() -> Vec<BuiltIn> {
@@ -30,15 +30,7 @@ fn check_ratios(skies: &[(Map, Map)], weight: Weight) {
         ..Analysis::default()
     };
     let run = |map: &Map, analysis: &Analysis| {
-        analysis
-            .minkowski_maps(map, &measures, longan::go_on)
-            .unwrap()
-            .blocks
-            .remove(0)
-            .values
-            .outer_iter()
-            .map(|row| row.to_vec())
-            .collect::<Vec<_>>()
+        rows(&analysis.minkowski_maps(map, &measures, longan::go_on).unwrap().blocks[0].values)
     };
     // The thresholds are those of the whole sky, so that the body is the same.
     let of_sky = skies.iter().map(|(sky, with_holes)| {
@@ -133,4 +125,23 @@ fn windows_with_little_contour_have_no_ratios_where_that_is_asked_for() {
         let analysis = Analysis { windows, min_contour: least, ..Analysis::default() };
         assert!(analysis.check(sky.grid()).is_err());
     }
+}
+
+#[test]
+fn undefined_maps_have_the_blocks_of_defined_ones() {
+    let measures = [longan::measures::find("evq").unwrap()];
+    let analysis = Analysis {
+        thresholds: "-1,0,1".parse().unwrap(),
+        windows: vec![10.0, 20.0],
+        by_threshold: true,
+        nside_out: Some(2),
+        ..Analysis::default()
+    };
+    let sky = Waves::new(20.0, 3).unwrap().map(Healpix::new(8).unwrap());
+    let blocks = |maps: longan::MinkowskiMaps| -> Vec<(f64, usize, usize)> {
+        maps.blocks.iter().map(|b| (b.window, b.thresholds.values().len(), b.values.len())).collect()
+    };
+    let defined = blocks(analysis.minkowski_maps(&sky, &measures, longan::go_on).unwrap());
+    assert_eq!(blocks(analysis.undefined(&vec![1.0; 768], &measures).unwrap()), defined);
+    assert_eq!(defined.iter().map(|block| block.1).collect::<Vec<_>>(), [1; 6]);
 }

@@ -9,7 +9,7 @@ use longan::window::{MovingWindows, Summation};
 use longan::{Analysis, Body, Healpix, Map, ThresholdUnit, Thresholds};
 use longan_formats::{self as formats, Selection};
 
-use longan_support::shared;
+use longan_support::{rows, shared};
 
 /// Relative to a column's largest value.
 const TOLERANCE: f64 = 1e-9;
@@ -76,15 +76,7 @@ fn check(shared: &Path, name: &str, data: &str, mask: Option<&str>, window: f64,
     let column = |name: &str| &table.columns[name];
     let run = |names: &[&str]| {
         let measures: Vec<BuiltIn> = names.iter().map(|n| find(n).unwrap()).collect();
-        analysis
-            .minkowski_maps(&map, &measures, longan::go_on)
-            .unwrap()
-            .blocks
-            .remove(0)
-            .values
-            .outer_iter()
-            .map(|row| row.to_vec())
-            .collect::<Vec<_>>()
+        rows(&analysis.minkowski_maps(&map, &measures, longan::go_on).unwrap().blocks[0].values)
     };
 
     let names = ["masked-fraction", "w0", "contour-length", "w1", "evq", "rank4-min", "rank4-mid", "rank4-max"];
@@ -174,7 +166,7 @@ fn check_curvature(shared: &Path, name: &str, map: &Map, thresholds: &Thresholds
         out[0] = m.curvature;
         m.psi.iter().enumerate().for_each(|(i, p)| out[1 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
     });
-    let columns: Vec<Vec<f64>> = columns[0].values[0].outer_iter().map(|row| row.to_vec()).collect();
+    let columns: Vec<Vec<f64>> = rows(&columns[0].values[0]);
     close("w2", &columns[0], &table.columns["w2"]);
     for s in 1..=8 {
         for (i, part) in ["re", "im"].iter().enumerate() {
@@ -268,15 +260,7 @@ fn layouts_of_one_sky_agree() {
     let run = |file: &str| {
         let map = read(&shared.join("data").join(file));
         let measures = ["evq", "w0"].map(|n| find(n).unwrap());
-        Analysis::default()
-            .minkowski_maps(&map, &measures, longan::go_on)
-            .unwrap()
-            .blocks
-            .remove(0)
-            .values
-            .outer_iter()
-            .map(|row| row.to_vec())
-            .collect::<Vec<_>>()
+        rows(&Analysis::default().minkowski_maps(&map, &measures, longan::go_on).unwrap().blocks[0].values)
     };
     let (ring, nested) = (run("grf_nside128_ring_f64.fits"), run("grf_nside128_nested_f32.fits.gz"));
     for (a, b) in ring.iter().zip(&nested) {

@@ -5,7 +5,7 @@ use longan::moments::{Selection, Weight};
 use longan::window::{MovingWindows, Summation, SummationCounts};
 use longan::{Body, Healpix, Map, Thresholds};
 
-use longan_support::{masked, noise};
+use longan_support::{masked, noise, rows};
 
 const RANKS: u32 = 8;
 
@@ -40,7 +40,7 @@ pub(crate) fn moments(
         m.psi.iter().enumerate().for_each(|(i, p)| out[4 + 2 * i..][..2].copy_from_slice(&[p.re, p.im]));
     });
     let windows = all.remove(0);
-    (windows.values[0].outer_iter().map(|row| row.to_vec()).collect(), windows.counts)
+    (rows(&windows.values[0]), windows.counts)
 }
 
 /// Compares prefix sums with direct ones and tells how many pairs were summed from prefix sums.

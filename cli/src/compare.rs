@@ -1,7 +1,8 @@
 //! `longan compare`: a Minkowski map of data against those of simulations.
 //!
-//! [`provenance_reader`] reads headers and finds what does not go together, [`work`] makes Minkowski maps of raw maps, [`scatter`]
-//! looks at one pixel, [`report`] tells people and programs. The comparison itself is left to [`longan::compare`].
+//! [`provenance_reader`] reads headers and finds what does not go together, [`work`] makes Minkowski maps of raw maps,
+//! [`scatter`] looks at one pixel, [`report`] tells people and programs. The comparison itself is left to
+//! [`longan::compare`].
 
 mod provenance_reader;
 mod report;

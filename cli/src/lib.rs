@@ -58,7 +58,7 @@ Examples:
   longan totals sky.fits                 area, length and Euler characteristic
   longan graph sky.fits -o graph.png     the same against threshold, drawn
   longan regrid stations.csv -o rainfall.fits --variable rain
-  longan plugin new slant                a crate in Rust for a measure of one's own
+  longan plugin new slant                a crate in Rust for a measure of your own
 
 Angles are in degrees, areas in steradian, lengths in radians on the unit sphere.
 Exit status: 0 all done; 1 something could not be read, analysed or written; 2 wrong arguments.")]

@@ -24,10 +24,11 @@ brackets; and these functions, with angles in radians:
 As in mathematics, -2^2 is -4 and 2^3^2 is 2^9. Where a measure is undefined, or a step has no finite number, so is the \
 formula. The header of the output keeps it as FORMULA1, FORMULA2 and so on, which are attributes in NetCDF.
 
-Plugins: libraries with measures of one's own, in C or Rust, named by --plugin or lying in a folder of the environment \
-variable LONGAN_PLUGIN_PATH. A measure whose name others have too is named with its plugin, as in example:evq, and a \
-built-in as longan:evq. A plugin is code that runs with your rights, from the moment that it is loaded, also for this \
-list: load only what you trust. One that was built for another version of the interface is refused: build it anew. \
+Plugins: measures of your own, loaded from a library in C or Rust that --plugin names or that lies in a folder of the \
+environment variable LONGAN_PLUGIN_PATH. A measure whose name others have too is named with its plugin, as in \
+example:evq, and a built-in as longan:evq. A plugin is code that runs with your rights, from the moment that it is \
+loaded, also for this list: load only what you trust. One that was built for another version of the interface is \
+refused: build it anew. \
 `longan plugin new NAME` starts one.
 
 Quantities: each measure states its own, a formula that it is a number. Headers keep it, as TQTY1, TQTY2 and so on, and of \

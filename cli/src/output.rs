@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use longan::measures::{Measure, Origin};
 use longan::statistics::Statistics;
-use longan::{Analysis, Block, Body, MinkowskiMaps, ThresholdUnit, Weight};
+use longan::{Analysis, Block, MinkowskiMaps, ThresholdUnit};
 use longan_formats::{Card, CardValue, NetcdfColumn};
 use longan_grid::Map;
 
@@ -189,17 +189,9 @@ impl Provenance<'_> {
             real("PSIERROR", block.counts.error, "error of psi_s over sum of |weights|, 0: direct sum"),
             real("MAXMASK", analysis.max_masked, "largest share of masked cells in a window"),
             real("MINCONT", analysis.min_contour, "[window radii] least contour for ratios"),
-            text("BODY", if analysis.body == Body::Above { "above" } else { "below" }, "side of the threshold"),
-            text(
-                "WEIGHT",
-                if analysis.weight == Weight::Length { "length" } else { "curvature" },
-                "W_1 or W_2 tensors",
-            ),
-            text(
-                "THRUNIT",
-                if analysis.threshold_unit == ThresholdUnit::Sigma { "sigma" } else { "value" },
-                "unit in which thresholds were given",
-            ),
+            text("BODY", analysis.body.name(), "side of the threshold"),
+            text("WEIGHT", analysis.weight.name(), "W_1 or W_2 tensors"),
+            text("THRUNIT", analysis.threshold_unit.name(), "unit in which thresholds were given"),
             integer("NTHRESH", thresholds.len(), "number of thresholds averaged over"),
         ]);
         // Without scatter there are no multiples of it.

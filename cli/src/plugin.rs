@@ -13,7 +13,7 @@ use super::options::{print, shown};
 /// Where measures are loaded from.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
 pub(crate) struct Plugins {
-    /// Library with measures of one's own, beside those in the folders of LONGAN_PLUGIN_PATH; may be repeated. It is
+    /// Library with measures of your own, beside those in the folders of LONGAN_PLUGIN_PATH; may be repeated. It is
     /// code that runs with your rights.
     #[arg(long, value_name = "FILE")]
     pub(crate) plugin: Vec<PathBuf>,
@@ -37,7 +37,7 @@ impl Plugins {
     }
 }
 
-/// Measures of one's own, in a library that longan loads.
+/// Measures of your own, loaded from a library.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(subcommand)]

@@ -126,7 +126,7 @@ const NAME_MAX: usize = 200;
 /// The file by whose lock processes know of each other.
 const LOCK: &str = "lock";
 
-/// A folder of one's own for an unfinished file, which goes with all that is in it.
+/// A folder for an unfinished file alone, which goes with all that is in it.
 ///
 /// The folder lies in another that all who write the same output share. Each of them holds the lock there, shared; the system
 /// frees it when a process ends, however it ends. So whoever gets it alone knows that what else lies there is nobody's,

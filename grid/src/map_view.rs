@@ -47,6 +47,11 @@ impl<'a> MapView<'a> {
     pub fn values(&self) -> &[f64] {
         &self.values
     }
+
+    /// The values alone, borrowed or copied as they are here.
+    pub fn into_values(self) -> Cow<'a, [f64]> {
+        self.values
+    }
 }
 
 impl<'a> From<&'a Map> for MapView<'a> {

@@ -48,6 +48,16 @@ pub enum Weight {
     Curvature,
 }
 
+impl Weight {
+    /// The name in options, headers and recipes: `length` or `curvature`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Weight::Length => "length",
+            Weight::Curvature => "curvature",
+        }
+    }
+}
+
 /// The moments of a window that a measure needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Needs {

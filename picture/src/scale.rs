@@ -247,7 +247,7 @@ mod tests {
         // A few values below zero make no signed field.
         let values: Vec<f64> = (-50..=1000).map(f64::from).collect();
         assert_eq!(scale(&values, Colouring::default()).colour(1000.0), Colours::Viridis.at(1.0));
-        // Zero stays neutral in a range of one's own.
+        // Zero stays neutral in a range that is given.
         let lopsided = scale(&[0.0], Colouring { colours: Some(Colours::BlueRed), ..ranged(-1.0, 3.0) });
         assert_eq!(lopsided.colour(0.0), signed.colour(0.0));
         assert_eq!(lopsided.colour(3.0), Colours::BlueRed.at(1.0));

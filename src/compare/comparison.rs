@@ -2,8 +2,7 @@
 
 use std::borrow::Cow;
 
-use longan_grid::Healpix;
-use ndarray::ArrayView1;
+use longan_grid::{Healpix, MapView};
 
 use super::ComparisonError;
 use super::ensemble::{Deviation, Ensemble, Rank};
@@ -22,26 +21,32 @@ pub struct Comparison<'a> {
 }
 
 impl<'a> Comparison<'a> {
-    /// A comparison of data without simulations yet: one value for each pixel in RING order, NaN where masked. The values
-    /// are borrowed where they are contiguous.
+    /// A comparison of data without simulations yet. Data and simulations are maps, or arrays or slices in RING order:
+    /// see [`MapView`].
     ///
     /// # Errors
-    /// [`ComparisonError::NotHealpix`].
-    pub fn new(data: impl Into<ArrayView1<'a, f64>>) -> Result<Self, ComparisonError> {
-        let data = contiguous(data.into());
-        let grid = Healpix::with_pixels(data.len()).ok_or(ComparisonError::NotHealpix { pixels: data.len() })?;
-        Ok(Comparison { grid, ensemble: Ensemble::new(data), simulations: 0, largest: Vec::new() })
+    /// [`ComparisonError::Grid`].
+    pub fn new<M>(data: M) -> Result<Self, ComparisonError>
+    where
+        M: TryInto<MapView<'a>, Error: Into<ComparisonError>>,
+    {
+        let data = data.try_into().map_err(Into::into)?;
+        let grid = data.grid();
+        Ok(Comparison { grid, ensemble: Ensemble::new(data.into_values()), simulations: 0, largest: Vec::new() })
     }
 
-    /// Takes a simulation into account for mean, scatter and percentiles: values in RING order, NaN where masked.
+    /// Takes a simulation into account for mean, scatter and percentiles.
     ///
     /// # Errors
-    /// [`ComparisonError::SecondBegan`], [`ComparisonError::Pixels`].
-    pub fn first<'b>(&mut self, simulation: impl Into<ArrayView1<'b, f64>>) -> Result<(), ComparisonError> {
+    /// [`ComparisonError::SecondBegan`], [`ComparisonError::Grid`], [`ComparisonError::Pixels`].
+    pub fn first<'b, M>(&mut self, simulation: M) -> Result<(), ComparisonError>
+    where
+        M: TryInto<MapView<'b>, Error: Into<ComparisonError>>,
+    {
         if !self.largest.is_empty() {
             return Err(ComparisonError::SecondBegan);
         }
-        self.ensemble.add(&contiguous(simulation.into()))?;
+        self.ensemble.add(simulation.try_into().map_err(Into::into)?.values())?;
         self.simulations += 1;
         Ok(())
     }
@@ -51,13 +56,17 @@ impl<'a> Comparison<'a> {
     ///
     /// # Errors
     /// [`ComparisonError::TooFew`] before two simulations have gone through the first pass,
-    /// [`ComparisonError::Passes`] beyond as many as it had, [`ComparisonError::Pixels`].
-    pub fn second<'b>(&mut self, simulation: impl Into<ArrayView1<'b, f64>>) -> Result<(), ComparisonError> {
+    /// [`ComparisonError::Passes`] beyond as many as it had, [`ComparisonError::Grid`], [`ComparisonError::Pixels`].
+    pub fn second<'b, M>(&mut self, simulation: M) -> Result<(), ComparisonError>
+    where
+        M: TryInto<MapView<'b>, Error: Into<ComparisonError>>,
+    {
         self.check_enough()?;
         if self.largest.len() == self.simulations {
             return Err(ComparisonError::Passes { first: self.simulations, second: self.simulations + 1 });
         }
-        self.largest.push(self.ensemble.largest_left_out(&contiguous(simulation.into()))?);
+        let simulation = simulation.try_into().map_err(Into::into)?;
+        self.largest.push(self.ensemble.largest_left_out(simulation.values())?);
         Ok(())
     }
 
@@ -96,14 +105,6 @@ impl<'a> Comparison<'a> {
             found @ (0 | 1) => Err(ComparisonError::TooFew { found }),
             _ => Ok(()),
         }
-    }
-}
-
-/// The values of a view in one piece, copied where they are not.
-fn contiguous(values: ArrayView1<'_, f64>) -> Cow<'_, [f64]> {
-    match values.to_slice() {
-        Some(values) => Cow::Borrowed(values),
-        None => Cow::Owned(values.to_vec()),
     }
 }
 
@@ -160,7 +161,7 @@ impl Outcome<'_> {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::{Array1, Array2, s};
+    use ndarray::{Array1, Array2, ArrayView1, s};
 
     use super::*;
 
@@ -192,6 +193,20 @@ mod tests {
     }
 
     #[test]
+    fn unseen_is_masked() {
+        let mut maps = maps();
+        let without = |maps: &Array2<f64>| {
+            let outcome = compared(&maps.rows().into_iter().collect::<Vec<_>>()).unwrap();
+            (outcome.rank, outcome.deviation.mean.to_vec(), outcome.deviation.count.to_vec())
+        };
+        (maps[[0, 2]], maps[[3, 5]]) = (f64::NAN, f64::NAN);
+        let expected = without(&maps);
+        (maps[[0, 2]], maps[[3, 5]]) = (longan_grid::UNSEEN, f64::INFINITY);
+        assert_eq!(without(&maps), expected);
+        assert_eq!(expected.2[5], 3.0);
+    }
+
+    #[test]
     fn passes_have_their_order() {
         let maps = maps();
         let rows: Vec<_> = maps.rows().into_iter().collect();
@@ -211,7 +226,7 @@ mod tests {
         assert_eq!(comparison.second(rows[3]), Err(ComparisonError::Passes { first: 2, second: 3 }));
         assert_eq!(comparison.simulations(), 2);
         assert!(comparison.finish().is_ok());
-        let none = Comparison::new(&[0.0; 13]).unwrap_err();
-        assert_eq!(none, ComparisonError::NotHealpix { pixels: 13 });
+        let none = Comparison::new(&vec![0.0; 13]).unwrap_err();
+        assert_eq!(none, longan_grid::Error::PixelCount { pixels: 13 }.into());
     }
 }

@@ -80,12 +80,12 @@ impl Ensemble {
         Ok(Zip::from(&self.values).and(&curves.values).map_collect(|all, &value| percentile(all, value)))
     }
 
-    /// Whether the values of curves lie outside a band, such as [`BAND_95`], which ends as far from 0 as from 1.
+    /// Whether the values of curves lie outside a band, such as [`BAND_95`], by their percentile; undefined ones do not.
     ///
     /// # Errors
     /// [`GraphError::Different`].
-    pub fn outside(&self, curves: &Curves, [low, _]: [f64; 2]) -> Result<Array2<bool>, GraphError> {
-        Ok(self.percentile(curves)?.map(|percent| (percent - 50.0).abs() > 100.0 * (0.5 - low)))
+    pub fn outside(&self, curves: &Curves, [low, high]: [f64; 2]) -> Result<Array2<bool>, GraphError> {
+        Ok(self.percentile(curves)?.map(|percent| *percent < 100.0 * low || *percent > 100.0 * high))
     }
 
     fn check(&self, curves: &Curves) -> Result<(), GraphError> {

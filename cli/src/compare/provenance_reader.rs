@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{bail, ensure};
-use longan::Weight;
 use longan::measures::Quantity;
+use longan::{ThresholdUnit, Weight};
 use longan_formats::{
     self as formats, Card, CardValue, Field, FieldDescription, GridDescription, Selection, TableDescription,
     TablePlace, is_alike, units_differ,
@@ -163,7 +163,7 @@ impl MadeFrom {
         let GridDescription::Healpix { nside, coordinates, .. } = table.grid else { unreachable!("a Minkowski map") };
         let formulas: Vec<String> =
             table.cards.iter().filter(|card| card.key.starts_with("FORMUL")).map(|card| words(&card.value)).collect();
-        let sigma = word("THRUNIT") == "sigma";
+        let sigma = word("THRUNIT") == ThresholdUnit::Sigma.name();
         MadeFrom {
             path: path.to_owned(),
             nside,
@@ -295,7 +295,7 @@ fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
     let real = |key: &str| table.card(key).and_then(number);
     let word = |key: &str| table.card(key).map(words).unwrap_or_default();
     let raw: Vec<f64> = (1..).map_while(|i| real(&format!("THR{i}"))).collect();
-    let given = match (word("THRUNIT") == "sigma", real("INMEAN"), real("INSIGMA")) {
+    let given = match (word("THRUNIT") == ThresholdUnit::Sigma.name(), real("INMEAN"), real("INSIGMA")) {
         (true, Some(mean), Some(sigma)) => raw.iter().map(|threshold| (threshold - mean) / sigma).collect(),
         _ => raw,
     };
@@ -303,7 +303,7 @@ fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
     let all: Vec<f64> =
         word("THRESHOLDS").split(',').map_while(|x| x.split_whitespace().next()?.parse().ok()).collect();
     let windows: Vec<f64> = word("WINDOW").split(',').filter_map(|window| window.trim().parse().ok()).collect();
-    let weight = if word("WEIGHT") == "curvature" { Weight::Curvature } else { Weight::Length };
+    let weight = if word("WEIGHT") == Weight::Curvature.name() { Weight::Curvature } else { Weight::Length };
     let column = |field: &FieldDescription| {
         let (hdu, name, own) = match &table.place {
             TablePlace::Hdu { hdu, name } => {

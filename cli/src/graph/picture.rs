@@ -5,6 +5,7 @@ use longan::graph::{BAND_68, BAND_95, Density, Ensemble, Graph, GraphError, Ordi
 use longan_picture::Drawing;
 use longan_picture::axes::BLACK;
 use longan_picture::chart::{Band, Chart, Curve, Panel, Sample, Shared};
+use ndarray::Array2;
 
 use super::{MapCurves, in_sigma};
 
@@ -20,8 +21,8 @@ pub(super) fn draw(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble
 }
 
 fn chart(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>) -> Result<Chart, GraphError> {
-    let panels = (0..graph.ordinates().len()).map(|q| panel(graph, data, ensemble, q));
-    let panels = panels.collect::<Result<Vec<Panel>, _>>()?;
+    let among = ensemble.map(|ensemble| Among::new(ensemble, data)).transpose()?;
+    let panels: Vec<Panel> = (0..graph.ordinates().len()).map(|q| panel(graph, data, among.as_ref(), q)).collect();
     let units: Vec<&str> = data.iter().filter_map(|map| map.unit.as_deref()).collect();
     let unit = match units.first() {
         _ if in_sigma(graph) => "σ",
@@ -62,21 +63,33 @@ fn evenly_in_logarithm(thresholds: &[f64]) -> bool {
     thresholds.len() > 2 && thresholds[0] > 0.0 && thresholds.windows(3).all(even)
 }
 
-fn panel(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>, q: usize) -> Result<Panel, GraphError> {
+/// The bands of an ensemble, and the data that lie outside of the widest: ordinate × threshold.
+struct Among {
+    /// Both ends, and whether the band lies within the other.
+    bands: Vec<([Array2<f64>; 2], bool)>,
+    /// For each map of data.
+    outside: Vec<Array2<bool>>,
+}
+
+impl Among {
+    fn new(ensemble: &Ensemble, data: &[MapCurves]) -> Result<Self, GraphError> {
+        let bands = [BAND_95, BAND_68].map(|band| (ensemble.band(band), band == BAND_68)).into();
+        let outside = data.iter().map(|map| ensemble.outside(&map.curves, BAND_95)).collect::<Result<_, _>>()?;
+        Ok(Among { bands, outside })
+    }
+}
+
+fn panel(graph: &Graph, data: &[MapCurves], among: Option<&Among>, q: usize) -> Panel {
     let x = |map: &MapCurves, t: usize| if in_sigma(graph) { map.curves.sigmas[t] } else { map.curves.thresholds[t] };
     let ordinate = &graph.ordinates()[q];
     let thresholds = 0..graph.analysis.thresholds.values().len();
     let mut panel = Panel { name: title(graph, ordinate), unit: ordinate.unit().to_owned(), ..Panel::default() };
-    if let Some(ensemble) = ensemble {
-        panel.bands.extend([BAND_95, BAND_68].map(|band| {
-            let [low, high] = ensemble.band(band);
-            let ends = thresholds.clone().map(|t| (x(&data[0], t), low[[q, t]], high[[q, t]])).collect();
-            Band { ends, inner: band == BAND_68 }
-        }));
+    for ([low, high], inner) in among.iter().flat_map(|among| &among.bands) {
+        let ends = thresholds.clone().map(|t| (x(&data[0], t), low[[q, t]], high[[q, t]])).collect();
+        panel.bands.push(Band { ends, inner: *inner });
     }
     for (colour, map) in data.iter().enumerate() {
-        let outside = ensemble.map(|ensemble| ensemble.outside(&map.curves, BAND_95)).transpose()?;
-        let is_outside = |t: &usize| outside.as_ref().is_some_and(|outside| outside[[q, *t]]);
+        let is_outside = |t: &usize| among.is_some_and(|among| among.outside[colour][[q, *t]]);
         panel.curves.push(Curve {
             points: thresholds.clone().map(|t| (x(map, t), map.curves.values[[q, t]])).collect(),
             colour,
@@ -109,7 +122,7 @@ fn panel(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>, q: usiz
             });
         }
     }
-    Ok(panel)
+    panel
 }
 
 fn title(graph: &Graph, ordinate: &Ordinate) -> String {

@@ -1,6 +1,5 @@
 //! The numbers of a graph as CSV, one value a row.
 
-use longan::Body;
 use longan::graph::{BAND_68, BAND_95, Ensemble, Graph};
 
 use super::MapCurves;
@@ -33,15 +32,12 @@ pub(super) fn csv(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>
     }
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record(&head)?;
-    let body = match graph.analysis.body {
-        Body::Above => "above",
-        Body::Below => "below",
-    };
+    let body = graph.analysis.body.name();
     let quantiles: Vec<_> =
         ensemble.iter().flat_map(|ensemble| QUANTILES.map(|(share, _)| ensemble.quantile(share))).collect();
+    let counts = ensemble.map(Ensemble::counts);
     for MapCurves { path, time, curves, .. } in data {
-        let among = ensemble.map(|ensemble| anyhow::Ok((ensemble.counts(), ensemble.percentile(curves)?)));
-        let among = among.transpose()?;
+        let percentiles = ensemble.map(|ensemble| ensemble.percentile(curves)).transpose()?;
         for (q, curve) in curves.iter().enumerate() {
             for (t, value) in curve.values.iter().enumerate() {
                 let mut row = vec![path.to_string_lossy().into_owned()];
@@ -56,7 +52,7 @@ pub(super) fn csv(graph: &Graph, data: &[MapCurves], ensemble: Option<&Ensemble>
                     row.extend([of_map.sigma0, of_map.sigma1].map(number));
                     row.push(curve.expected.map(|expected| number(expected[t])).unwrap_or_default());
                 }
-                if let Some((counts, percentiles)) = &among {
+                if let (Some(counts), Some(percentiles)) = (&counts, &percentiles) {
                     row.extend([counts[[q, t]].to_string(), number(percentiles[[q, t]])]);
                     row.extend(quantiles.iter().map(|quantile| number(quantile[[q, t]])));
                 }

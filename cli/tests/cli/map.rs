@@ -4,18 +4,11 @@ use longan::{Analysis, Body, ThresholdUnit, Weight};
 
 use super::*;
 use longan_support::bytes::{gzip, i16s};
+use longan_support::rows;
 
 /// What the library makes of `sky.fits`, possibly masked.
 fn of_library(folder: &Folder, analysis: &Analysis, measures: &[BuiltIn]) -> Vec<Vec<f64>> {
-    analysis
-        .minkowski_maps(&folder.read("sky.fits", "0"), measures, longan::go_on)
-        .unwrap()
-        .blocks
-        .remove(0)
-        .values
-        .outer_iter()
-        .map(|row| row.to_vec())
-        .collect::<Vec<_>>()
+    rows(&analysis.minkowski_maps(&folder.read("sky.fits", "0"), measures, longan::go_on).unwrap().blocks[0].values)
 }
 
 /// The mask of `sky.fits` in RING order: nothing south of 30° S.
@@ -150,15 +143,7 @@ fn options_reach_the_analysis() {
     for (options, max_masked) in [("", 0.0625), ("--max-masked 0.4", 0.4)] {
         folder.done(&format!("map sky.fits -o out.fits --overwrite --mask mask.fits {options}"));
         let analysis = Analysis { max_masked, ..base.clone() };
-        let expected = analysis
-            .minkowski_maps(&map, &measures[..1], longan::go_on)
-            .unwrap()
-            .blocks
-            .remove(0)
-            .values
-            .outer_iter()
-            .map(|row| row.to_vec())
-            .collect::<Vec<_>>();
+        let expected = rows(&analysis.minkowski_maps(&map, &measures[..1], longan::go_on).unwrap().blocks[0].values);
         assert_eq!(difference(folder.read("out.fits", "EVQ").values(), &expected[0]), 0.0);
         let header = &folder.headers("out.fits")[0];
         assert_eq!([&header["MASKFILE"], &header["MASKTHR"]], ["mask.fits", "0.9"]);

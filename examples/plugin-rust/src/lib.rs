@@ -2,7 +2,7 @@
 //!
 //! `cargo build --release -p longan-example-plugin`, then
 //! `longan map sky.fits -o out.fits --plugin target/release/liblongan_example_plugin.so --measure shape-index`.
-//! `longan plugin new NAME` writes a crate of one's own to start from.
+//! `longan plugin new NAME` writes a crate of your own to start from.
 
 #![forbid(unsafe_code)]
 

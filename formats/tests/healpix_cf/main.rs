@@ -3,6 +3,8 @@
 
 mod broken;
 mod dialects;
+#[path = "../support/errors.rs"]
+mod errors;
 mod file;
 mod steps;
 mod writing;
@@ -10,8 +12,10 @@ mod zarr;
 
 use std::path::Path;
 
-use longan_formats::{Error, ErrorKind, Field, Selection};
+use longan_formats::{Error, Field, Selection};
 use longan_grid::Map;
+
+use errors::is;
 
 /// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
 const NEST_TO_RING_2: [usize; 48] = [
@@ -47,12 +51,6 @@ fn problem<T>(result: Result<T, Error>) -> (Error, String) {
     let told = error.problem().to_string();
     assert!(!told.contains('\n') && !told.ends_with('.'), "{told}");
     (error, told)
-}
-
-/// Whether an error is of a kind, and its sentence has this part.
-#[track_caller]
-fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
-    error.kind() == kind && error.problem().to_string().contains(part)
 }
 
 /// Asserts that two maps have the same bits, NaN equal to NaN.

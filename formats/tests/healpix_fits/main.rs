@@ -1,5 +1,7 @@
 //! HEALPix FITS files, read and written. Files to read are made byte by byte in [`longan_support::bytes`], without the FITS library.
 
+#[path = "../support/errors.rs"]
+mod errors;
 mod headers;
 mod layouts;
 mod multi_order;
@@ -10,8 +12,10 @@ mod writing;
 
 use std::path::PathBuf;
 
-use longan_formats::{Error, ErrorKind, Field, Selection};
+use longan_formats::{Error, Field, Selection};
 use longan_grid::Map;
+
+use errors::{grid, is};
 
 /// RING numbers of the NESTED pixels of Nside 2, from healpy's `nest2ring(2, range(48))`.
 const NEST_TO_RING_2: [usize; 48] = [
@@ -71,18 +75,6 @@ fn problem<T>(result: Result<T, Error>) -> (Error, String) {
     assert_eq!(error.to_string(), format!("{shown}: {told}"));
     assert!(!told.contains('\n') && !told.ends_with('.') && !told.contains("map.fits"), "{told}");
     (error, told)
-}
-
-/// Whether an error is of a kind, and its sentence has this part.
-#[track_caller]
-fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
-    error.kind() == kind && error.problem().to_string().contains(part)
-}
-
-/// The problem of the grid in an error.
-#[track_caller]
-fn grid(error: &Error) -> &longan_grid::Error {
-    error.problem().downcast_ref().unwrap_or_else(|| panic!("no problem of the grid: {error}"))
 }
 
 /// Asserts that two maps have the same bits, NaN equal to NaN.

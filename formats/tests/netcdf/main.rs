@@ -2,6 +2,8 @@
 
 mod broken;
 mod described;
+#[path = "../support/errors.rs"]
+mod errors;
 mod inputs;
 mod layouts;
 mod paths;
@@ -10,8 +12,10 @@ mod selections;
 
 use std::path::Path;
 
-use longan_formats::{At, Error, ErrorKind, Field, Place, Selection};
+use longan_formats::{At, Error, Field, Place, Selection};
 use longan_grid::Map;
+
+use errors::{grid, is};
 
 use inputs::{Data, Nc, text, var};
 
@@ -83,18 +87,6 @@ fn problem<T>(result: Result<T, Error>) -> (Error, String) {
     let told = error.problem().to_string();
     assert!(!told.contains('\n') && !told.ends_with('.') && !told.contains(&path.display().to_string()), "{told}");
     (error, told)
-}
-
-/// Whether an error is of a kind, and its sentence has this part.
-#[track_caller]
-fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
-    error.kind() == kind && error.problem().to_string().contains(part)
-}
-
-/// The problem of the grid in an error.
-#[track_caller]
-fn grid(error: &Error) -> &longan_grid::Error {
-    error.problem().downcast_ref().unwrap_or_else(|| panic!("no problem of the grid: {error}"))
 }
 
 /// Asserts that two maps are the same but for rounding, and NaN in the same places.

@@ -3,6 +3,8 @@
 
 mod broken;
 mod cortex;
+#[path = "../support/errors.rs"]
+mod errors;
 mod gathering;
 mod surfaces;
 mod tables;
@@ -10,8 +12,10 @@ mod tables;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use longan_formats::{Error, ErrorKind, Selection};
+use longan_formats::{Error, Selection};
 use longan_grid::{Gather, Healpix, Map, Regrid};
+
+use errors::{grid, is};
 
 /// A file in a folder of its own.
 struct Scratch {
@@ -51,18 +55,6 @@ fn problem_with(bytes: &[u8], selection: &Selection) -> (Error, String) {
     let told = error.problem().to_string();
     assert!(!told.contains('\n') && !told.ends_with('.') && told.len() < 400, "{told}");
     (error, told)
-}
-
-/// Whether an error is of a kind, and its sentence has this part.
-#[track_caller]
-fn is(error: &Error, kind: ErrorKind, part: &str) -> bool {
-    error.kind() == kind && error.problem().to_string().contains(part)
-}
-
-/// The problem of the grid in an error.
-#[track_caller]
-fn grid(error: &Error) -> &longan_grid::Error {
-    error.problem().downcast_ref().unwrap_or_else(|| panic!("no problem of the grid: {error}"))
 }
 
 /// Asserts that two maps have the same bits, NaN equal to NaN.

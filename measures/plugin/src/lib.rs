@@ -1,4 +1,4 @@
-//! Measures of one's own for longan, in a library that it loads when it runs.
+//! Measures of your own for longan, loaded from a library when it runs.
 //!
 //! Implement [`Measure`] as the built-ins do, [`export!`] it from a crate of the type `cdylib`, and check it with
 //! [`testing::check`]. `longan plugin new NAME` writes such a crate. Nothing of it needs `unsafe`; a panic becomes an

@@ -8,6 +8,7 @@ mod needed;
 pub use needed::{cdo, fitsverify, python_with, shared, skip};
 
 use longan_grid::Map;
+use ndarray::ArrayView2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -33,6 +34,11 @@ pub fn turned(map: &Map) -> Map {
 pub fn masked(map: &Map, masked: impl Fn(usize) -> bool) -> Map {
     let values = map.values().iter().enumerate().map(|(p, &v)| if masked(p) { f64::NAN } else { v });
     Map::new(map.name.clone(), values.collect()).unwrap()
+}
+
+/// The rows of an array.
+pub fn rows<'a>(values: impl Into<ArrayView2<'a, f64>>) -> Vec<Vec<f64>> {
+    values.into().outer_iter().map(|row| row.to_vec()).collect()
 }
 
 /// The largest difference; two NaN do not differ, NaN and a number do.
