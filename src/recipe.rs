@@ -4,8 +4,10 @@
 //! A default that is written out makes the recipe that it makes where it is left out. Which files were taken, and how a
 //! recipe is written, is left to others.
 
+use std::fmt;
+
 use longan_grid::Healpix;
-use longan_measures::{Measure, Origin};
+use longan_measures::{Measure, Origin, column_of};
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::{Analysis, AnalysisError};
@@ -69,28 +71,19 @@ pub struct MeasureRecipe {
     pub plugin: Option<String>,
 }
 
-/// How a field was chosen, brought to HEALPix and masked: names and settings, whatever the file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// How a field was had and how results are laid out: settings in words, equal where the choices are.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FieldRecipe {
-    /// The variable or column.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub variable: Option<String>,
-    /// The table of a FITS file.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hdu: Option<usize>,
-    /// Places along dimensions, such as `level=500`, in the order of their names.
+    /// The table, the field and the places along other dimensions, such as `hdu=1`, `field=z`, `level=500`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub select: Vec<String>,
+    pub place: Vec<String>,
     /// The way to HEALPix and its settings, for a field on another grid or at points.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub regrid: Vec<String>,
-    /// Pixels whose mask value is below this are masked, where there is a mask.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mask_threshold: Option<f64>,
-    /// The variable or column of the mask, and places along its dimensions.
+    pub regridding: Vec<String>,
+    /// The place of the mask in its file and the value below which it masks, where there is a mask.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub mask_field: Vec<String>,
+    pub mask: Vec<String>,
     /// Ordering and precision of what is written.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub layout: Vec<String>,
@@ -107,7 +100,7 @@ impl Analysis {
             let (formula, plugin) = match measure.origin() {
                 Origin::Program => (None, None),
                 Origin::Formula(formula) => (Some(formula), None),
-                Origin::Plugin(plugin) => (None, Some(plugin)),
+                Origin::Plugin(plugin) => (None, Some(format!("{} {}", plugin.name, plugin.version))),
             };
             MeasureRecipe { name: measure.name(), formula, plugin }
         };
@@ -134,14 +127,30 @@ impl Analysis {
 }
 
 impl Recipe {
-    /// The first choice that differs from another recipe's, with both values: `("windows", "[6.0]", "[4.0]")`.
+    /// The first choice that differs from another recipe's, with both values in words: `("windows", "6", "4")`. Of lists
+    /// only what the other lacks is named, where both have such.
     pub fn difference(&self, other: &Recipe) -> Option<(&'static str, String, String)> {
-        macro_rules! differences {
-            ($($field:ident),*) => {
-                [$((stringify!($field), format!("{:?}", self.$field), format!("{:?}", other.$field))),*]
-            };
+        let pairs = std::iter::zip(self.choices(), other.choices());
+        let ((name, one), (_, other)) = pairs.into_iter().find(|((_, one), (_, other))| one != other)?;
+        let lacks = |these: &[String], those: &[String]| -> Vec<String> {
+            these.iter().filter(|value| !those.contains(value)).cloned().collect()
+        };
+        let (only_one, only_other) = (lacks(&one, &other), lacks(&other, &one));
+        let both = !only_one.is_empty() && !only_other.is_empty();
+        let words = |all: Vec<String>, only: Vec<String>| match if both { only } else { all } {
+            list if list.is_empty() => "none".to_owned(),
+            list => list.join(", "),
+        };
+        Some((name, words(one, only_one), words(other, only_other)))
+    }
+
+    /// Every choice by its name, with its values in words.
+    fn choices(&self) -> [(&'static str, Vec<String>); 17] {
+        fn words<T: ToString>(values: &[T]) -> Vec<String> {
+            values.iter().map(T::to_string).collect()
         }
-        let all = differences!(
+        // A new choice does not compile until it is listed.
+        let Recipe {
             revision,
             measures,
             windows,
@@ -155,9 +164,45 @@ impl Recipe {
             min_contour,
             by_threshold,
             tolerance,
-            field
-        );
-        all.into_iter().find(|(_, one, other)| one != other)
+            field,
+        } = self;
+        let FieldRecipe { place, regridding, mask, layout } = field;
+        [
+            ("revision", vec![revision.to_string()]),
+            ("measures", words(measures)),
+            ("windows", words(windows)),
+            ("thresholds", words(thresholds)),
+            ("threshold unit", vec![threshold_unit.clone()]),
+            ("body", vec![body.clone()]),
+            ("weight", vec![weight.clone()]),
+            ("Nside of the field", vec![nside.to_string()]),
+            ("Nside of the result", vec![nside_out.to_string()]),
+            ("largest masked share", vec![max_masked.to_string()]),
+            ("least contour", vec![min_contour.to_string()]),
+            ("each threshold by itself", vec![by_threshold.to_string()]),
+            ("tolerance", vec![tolerance.to_string()]),
+            ("field", words(place)),
+            ("way to HEALPix", words(regridding)),
+            ("mask", words(mask)),
+            ("layout", words(layout)),
+        ]
+    }
+}
+
+impl MeasureRecipe {
+    /// The name of the measure's column in a file.
+    pub fn column(&self) -> String {
+        column_of(&self.name)
+    }
+}
+
+impl fmt::Display for MeasureRecipe {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.formula, &self.plugin) {
+            (Some(formula), _) => f.write_str(formula),
+            (None, Some(plugin)) => write!(f, "{} of {plugin}", self.name),
+            (None, None) => f.write_str(&self.name),
+        }
     }
 }
 
@@ -213,7 +258,11 @@ mod tests {
             let measure: [Box<dyn Measure>; 1] = [Box::new(Formula::new(text).unwrap())];
             Analysis::default().recipe(Healpix::new(64).unwrap(), &measure).unwrap()
         };
-        assert_ne!(formula("x = psi2/w1"), formula("x = psi2/w2"));
+        let [one, other] = ["x = psi2/w1", "x = psi2/w2"].map(formula);
+        assert_eq!(one.difference(&other), Some(("measures", "x = psi2/w1".to_owned(), "x = psi2/w2".to_owned())));
+        let mut masked = one.clone();
+        masked.field.mask = vec!["threshold=0.9".to_owned()];
+        assert_eq!(one.difference(&masked), Some(("mask", "none".to_owned(), "threshold=0.9".to_owned())));
         let (coarse, fine) = (Healpix::new(8).unwrap(), Healpix::new(32).unwrap());
         let evq = [find("evq").unwrap()];
         assert_ne!(Analysis::default().recipe(coarse, &evq), Analysis::default().recipe(fine, &evq));

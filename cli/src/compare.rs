@@ -1,13 +1,13 @@
 //! `longan compare`: a Minkowski map of data against those of simulations.
 //!
-//! [`provenance_reader`] reads headers and finds what does not go together, [`work`] makes Minkowski maps of raw maps,
+//! [`provenance_reader`] reads headers and finds what does not go together, [`cache`] makes Minkowski maps of raw maps,
 //! [`scatter`] looks at one pixel, [`report`] tells people and programs. The comparison itself is left to
 //! [`longan::compare`].
 
+mod cache;
 mod provenance_reader;
 mod report;
 mod scatter;
-mod work;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -23,15 +23,16 @@ use longan_formats::{self as formats, Card};
 use longan_grid::Healpix;
 use ndarray::Array1;
 
-use super::mapping::Mapping;
+use super::input::Input;
+use super::map_options::Mapping;
+use super::map_writer::{self, Kind, MapColumn, Step, Table};
 use super::mismatch::Together;
 use super::misused;
 use super::options::{Format, Running, between, check_apart, check_memory, print, shown, whole};
-use super::output::{command, creator, integer, numbered, real, text};
 use super::parallel::Jobs;
 use super::progress::Progress;
+use super::provenance::{command, creator, integer, numbered, real, text};
 use super::quantity::stated;
-use super::sink::{self, Kind, MapColumn, Step, Table};
 use provenance_reader::{Column, MadeFrom};
 use report::{OfMeasure, Region, Report};
 use scatter::{At, Scatter};
@@ -115,7 +116,7 @@ pub(crate) struct Arguments {
 }
 
 /// Options that make sense without --work. All others say how Minkowski maps are made.
-const WITHOUT_WORK: [&str; 19] = [
+const WITHOUT_WORK: [&str; 20] = [
     "data",
     "simulations",
     "output",
@@ -129,6 +130,7 @@ const WITHOUT_WORK: [&str; 19] = [
     "overwrite",
     "measure",
     "hdu",
+    "select",
     "ignore_coordsys",
     "ordering",
     "float32",
@@ -155,7 +157,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             arguments.check_together(&inputs)?;
             let made = |inputs: &[&Path]| {
                 let (mapping, jobs, running) = (&arguments.mapping, &arguments.jobs, &arguments.running);
-                work::minkowski_maps(folder, inputs, mapping, measures.clone(), jobs, running)
+                cache::minkowski_maps(folder, inputs, mapping, measures.clone(), jobs, running)
             };
             if let Some(scatter) = &scatter {
                 // Whether the place is masked shows before all simulations are measured.
@@ -175,7 +177,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let columns = arguments.columns(&files)?;
     let pair = scatter.as_ref().map(|scatter| scatter.pair(&columns)).transpose()?;
-    let grid = Healpix::new(data.nside)?;
+    let grid = Healpix::new(data.recipe.nside_out)?;
     check_memory(grid, 12 * columns.len())?;
     let smoothing = arguments.smooth.map(|fwhm| Smoothing::new(grid, fwhm)).transpose()?;
     arguments.warn_of_resolution(data, simulations);
@@ -219,7 +221,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut report = Report {
         data: shown(&arguments.data),
         simulations: simulations.len(),
-        nside: data.nside,
+        nside: data.recipe.nside_out,
         smoothing_fwhm_deg: arguments.smooth,
         level_sigma: arguments.level,
         measures: Vec::new(),
@@ -233,7 +235,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         maps.append(&mut columns);
     }
     let step = arguments.step(data, &report, maps);
-    sink::write(&arguments.output, kind, layout, arguments.overwrite, [Ok(step)])?;
+    map_writer::write(&arguments.output, kind, layout, arguments.overwrite, [Ok(step)])?;
     if let (Some(scatter), Some(pair)) = (&scatter, pair) {
         let files: Vec<&Path> = arguments.inputs().collect();
         report.scatter = scatter.write(&files, &points, pair.map(|i| &columns[i]), arguments.overwrite)?;
@@ -294,19 +296,19 @@ impl Arguments {
 
     /// Warns where the maps measured had another resolution, or came to HEALPix in another way.
     fn warn_of_resolution(&self, data: &MadeFrom, simulations: &[MadeFrom]) {
-        if let Some(other) = simulations.iter().find(|other| other.input_nside != data.input_nside) {
+        if let Some(other) = simulations.iter().find(|other| other.recipe.nside != data.recipe.nside) {
             self.running.warn(format_args!(
                 "{} was measured at Nside {}, and {} at Nside {}; shapes depend on the resolution",
                 shown(&data.path),
-                data.input_nside,
+                data.recipe.nside,
                 shown(&other.path),
-                other.input_nside
+                other.recipe.nside
             ));
         }
 
-        if let Some(other) = simulations.iter().find(|other| other.way.is_empty() != data.way.is_empty()) {
+        if let Some(other) = simulations.iter().find(|other| other.way().is_empty() != data.way().is_empty()) {
             let said = |file: &MadeFrom| {
-                if file.way.is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way) }
+                if file.way().is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way()) }
             };
             self.running.warn(format_args!(
                 "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
@@ -339,9 +341,9 @@ impl Arguments {
 
     /// The provenance of all files, each of which holds Minkowski maps.
     fn said(&self) -> anyhow::Result<Vec<MadeFrom>> {
-        let hdu = self.mapping.input().hdu;
+        let Input { hdu, select: at, .. } = self.mapping.input();
         let said =
-            self.inputs().map(|path| Ok((path, MadeFrom::of(path, hdu)?))).collect::<anyhow::Result<Vec<_>>>()?;
+            self.inputs().map(|path| Ok((path, MadeFrom::of(path, *hdu, at)?))).collect::<anyhow::Result<Vec<_>>>()?;
         if let Some((path, _)) = said.iter().find(|(_, said)| said.is_none()) {
             match said.iter().find(|(_, said)| said.is_some()) {
                 Some((other, _)) => bail!(

@@ -12,11 +12,12 @@ use longan::{Analysis, Body, Healpix, Map, MinkowskiMaps, ThresholdUnit, go_on};
 use longan_formats as formats;
 use longan_picture::{Options, Panel, panels};
 
+use super::identity::Identity;
+use super::map_writer::Step;
 use super::options::{Running, shown};
-use super::output::Provenance;
 use super::picture_format::save;
+use super::provenance::Provenance;
 use super::simulate::{self, step, waves_cards};
-use super::sink::Step;
 
 /// Simulates maps, measures them, prints numbers that you can check, and writes maps and a picture.
 #[derive(Args, Debug)]
@@ -66,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let (_, totals, _) = analysis.totals(&bodies)?;
     say(format!("  Euler characteristic {:.6}   (seven bodies, no holes)", totals[0].euler_characteristic()))?;
-    write("shapes_evq.fits", maps.grid, minkowski(&maps, &bodies, "shapes.fits", &analysis, &evq))?;
+    write("shapes_evq.fits", maps.grid, minkowski(&maps, &bodies, "shapes.fits", &analysis, &evq)?)?;
 
     let (correlation, seed) = FIELD;
     let waves = Waves::new(correlation, seed)?;
@@ -88,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     say(format!("  Minkowski map of Nside {NSIDE_OUT}: {seconds:.2} s"))?;
 
-    write("waves_evq.fits", maps.grid, minkowski(&maps, &field, "waves.fits", &analysis, &evq))?;
+    write("waves_evq.fits", maps.grid, minkowski(&maps, &field, "waves.fits", &analysis, &evq)?)?;
     let top = Options {
         title: "Gaussian field".to_owned(),
         label: "value in σ".to_owned(),
@@ -108,7 +109,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// What is written of Minkowski maps.
-fn minkowski(maps: &MinkowskiMaps, map: &Map, name: &str, analysis: &Analysis, measures: &[BuiltIn]) -> Step {
+fn minkowski(
+    maps: &MinkowskiMaps,
+    map: &Map,
+    name: &str,
+    analysis: &Analysis,
+    measures: &[BuiltIn],
+) -> anyhow::Result<Step> {
+    let identity = &Identity { recipe: analysis.recipe(map.grid(), measures)?, inputs: Vec::new() };
     let command = "longan demo".to_owned();
-    Provenance { path: name.as_ref(), map, input: None, analysis, command }.step(maps, measures)
+    Ok(Provenance { path: name.as_ref(), map, input: None, analysis, identity, command }.step(maps, measures))
 }

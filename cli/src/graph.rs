@@ -18,7 +18,7 @@ use longan_formats as formats;
 use longan_picture::axes::PALETTE;
 
 use super::input::{Input, Mask};
-use super::mapping::{find, no_measure};
+use super::map_options::{find, no_measure};
 use super::mismatch::Together;
 use super::options::{
     BodyOptions, ContourOption, Running, WeightOption, between, check_apart, check_memory, nside, shown,

@@ -8,7 +8,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use longan::ThresholdUnit;
-use longan_formats::{self as formats, About, Ask, At, Error, Field, MapSeries, MemoryEstimate, Place, Selection};
+use longan_formats::{
+    self as formats, About, Ask, At, Error, Field, MapSeries, MemoryEstimate, Place, Selection, Target,
+};
 use longan_grid::{CoordinateSystem, Gather, Healpix, Map, Method, Regrid};
 
 use super::mismatch::{Together, of_coordinates};
@@ -26,7 +28,7 @@ pub(crate) struct Input {
     /// Place along a dimension, by the value of its coordinate or by its number from 0, such as level=500,
     /// time=1997-12 or time=#0; may be repeated. Without a place in time there is a map for each step.
     #[arg(long, value_name = "DIM=VALUE|DIM=#N", value_parser = place)]
-    select: Vec<At>,
+    pub(crate) select: Vec<At>,
     /// Number of the FITS extension, 0 for the primary one [default: the first with a map].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
     pub(crate) hdu: Option<usize>,
@@ -120,8 +122,11 @@ impl Input {
         let selection =
             Selection { field: self.mask_field.clone(), at: self.mask_select.clone(), regrid, ..Selection::default() };
         let mask = |path: &PathBuf| {
-            let system = formats::open(path, &selection).map_err(of_mask)?.about().coordinates;
+            let maps = formats::open(path, &selection).map_err(of_mask)?;
+            let (system, mut settings) = (maps.about().coordinates, maps.place());
+            settings.push(format!("threshold={}", self.mask_threshold));
             Ok(Mask {
+                settings,
                 path: path.clone(),
                 selection,
                 threshold: self.mask_threshold,
@@ -131,21 +136,6 @@ impl Input {
             })
         };
         self.mask.as_ref().map(mask).transpose()
-    }
-
-    /// Forgets which ways to HEALPix were asked for.
-    pub(crate) fn leave_out_ways(&mut self) {
-        self.regrid.method = None;
-        self.regrid.gather = None;
-    }
-
-    /// The name of the way in which a file's maps come to HEALPix, where there are several ways.
-    pub(crate) fn way(&self, path: &Path) -> Result<Option<String>, Error> {
-        if !formats::has_ways(path)? {
-            return Ok(None);
-        }
-        let regridded = formats::open(path, &self.selection())?.regridded()?;
-        Ok(regridded.map(|regridded| regridded.way.to_string()))
     }
 
     /// Refuses maps whose units differ where thresholds are in the map's unit. Files that cannot be read are passed over,
@@ -188,6 +178,16 @@ impl Series {
         self.maps.memory()
     }
 
+    /// The place of the maps in their file.
+    pub(crate) fn place(&self) -> Vec<String> {
+        self.maps.place()
+    }
+
+    /// The grid that maps are brought to, and how.
+    pub(crate) fn target(&mut self) -> Result<Target, Error> {
+        self.maps.target().map_err(|e| e.with_path(&self.path))
+    }
+
     /// Reads the map of a step and masks it.
     pub(crate) fn read(&mut self, step: usize, mask: Option<&Mask>) -> anyhow::Result<Map> {
         if let Some(mask) = mask {
@@ -206,6 +206,8 @@ pub(crate) struct Mask {
     path: PathBuf,
     selection: Selection,
     threshold: f64,
+    /// The place in the file and the threshold, in words.
+    pub(crate) settings: Vec<String>,
     /// The coordinate system that the mask names, if that matters.
     system: Option<CoordinateSystem>,
     running: Running,

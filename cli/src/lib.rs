@@ -8,26 +8,30 @@
 mod compare;
 mod demo;
 mod graph;
+mod identity;
 mod info;
 mod input;
 mod map;
-mod mapping;
+mod map_options;
+mod map_writer;
 mod measures;
+mod minkowski_file;
 mod mismatch;
 mod options;
-mod output;
 mod parallel;
 mod picture_format;
 mod plot;
 mod plugin;
 mod progress;
+mod provenance;
 mod quantity;
 mod regrid;
 mod regridding;
 mod remedies;
 mod simulate;
-mod sink;
 mod totals;
+
+pub use minkowski_file::write_minkowski_maps;
 
 use std::io::Write;
 use std::process::ExitCode;

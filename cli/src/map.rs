@@ -1,6 +1,6 @@
 //! `longan map`: Minkowski maps of one or many files.
 //!
-//! What is made of a file is left to [`mapping`](super::mapping).
+//! What is made of a file is left to [`mapping`](super::map_options).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,17 +9,17 @@ use std::str::FromStr;
 use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
-use clap::{Args, Parser};
+use clap::Args;
 use longan_formats::{self as formats, CardValue, Error, ErrorKind, TableDescription};
 
-use super::mapping::{Made, Mapper, Mapping};
-use super::options::{Running, check_apart, is_same_file, shown};
-use super::output::command;
+use super::identity::Identity;
+use super::map_options::{Made, Mapper, Mapping};
+use super::map_writer::Kind;
+use super::options::{Running, check_apart, shown};
 use super::parallel::Jobs;
 use super::progress::{Progress, rate};
-use super::regridding;
+use super::provenance::command;
 use super::remedies::told;
-use super::sink::Kind;
 
 /// Minkowski map of a field on the sphere: measures of shape in windows about the pixels of a coarser grid.
 ///
@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     mapping.input().check_units(&arguments.inputs, mapping.analysis().threshold_unit)?;
     let tasks = arguments.tasks()?;
     let mapper = mapping.mapper(measures, arguments.jobs.memory(), &arguments.running, arguments.inputs.len() > 1)?;
+    let tasks = arguments.unfinished(tasks, &mapper)?;
     let progress = match &tasks[..] {
         [(input, _)] => Progress::new(shown(input), arguments.running.quiet),
         tasks => Progress::of_parts(tasks.len(), arguments.running.quiet),
@@ -109,8 +110,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
-    /// Inputs of this shard and their outputs, those that are finished left out, after all checks that need no reading
-    /// of inputs.
+    /// Inputs of this shard and their outputs, after all checks that need no reading of inputs.
     fn tasks(&self) -> anyhow::Result<Vec<(&Path, PathBuf)>> {
         let out = &self.output;
         let into_folder = self.inputs.len() > 1 || out.is_dir() || out.to_string_lossy().ends_with('/');
@@ -154,19 +154,6 @@ impl Arguments {
                     .say(format_args!("shard {shard} has none of the {all} inputs, so there is nothing to do"))?;
             }
         }
-        if self.resume {
-            let all = tasks.len();
-            let (finished, rest) = tasks.into_iter().partition(|(_, output)| output.is_file());
-            tasks = rest;
-            for (input, output) in &finished as &Vec<(&Path, PathBuf)> {
-                self.check_finished(input, output)?;
-                formats::tidy(output);
-            }
-            if !finished.is_empty() {
-                let finished = finished.len();
-                self.running.say(format_args!("{finished} of {all} outputs exist, and stay as they are"))?;
-            }
-        }
         for (_, output) in &tasks {
             Kind::of(output)?;
             match formats::check_writable(output, self.overwrite) {
@@ -177,53 +164,61 @@ impl Arguments {
         Ok(tasks)
     }
 
+    /// The tasks whose output is not there yet.
+    fn unfinished<'a>(
+        &self,
+        tasks: Vec<(&'a Path, PathBuf)>,
+        mapper: &Mapper<'_>,
+    ) -> anyhow::Result<Vec<(&'a Path, PathBuf)>> {
+        if !self.resume {
+            return Ok(tasks);
+        }
+        let all = tasks.len();
+        let (finished, rest): (Vec<_>, _) = tasks.into_iter().partition(|(_, output)| output.is_file());
+        for (input, output) in &finished {
+            self.check_finished(mapper, input, output)?;
+            formats::tidy(output);
+        }
+        if !finished.is_empty() {
+            let finished = finished.len();
+            self.running.say(format_args!("{finished} of {all} outputs exist, and stay as they are"))?;
+        }
+        Ok(rest)
+    }
+
     /// Refuses an output that was not made of this input as this run would make it.
-    fn check_finished(&self, input: &Path, output: &Path) -> anyhow::Result<()> {
+    fn check_finished(&self, mapper: &Mapper<'_>, input: &Path, output: &Path) -> anyhow::Result<()> {
         let table = formats::describe(output).ok().and_then(|description| description.tables.into_iter().next());
-        let made_by = table.as_ref().and_then(made_by).with_context(|| {
-            format!(
-                "{}: this does not say that `longan map` made it, so --resume cannot go by it; remove it or choose \
-                 another folder",
+        let stated = table.as_ref().map(Identity::stated).transpose().with_context(|| shown(output))?;
+        let (Some(table), Some(made)) = (table, stated.flatten()) else {
+            bail!(
+                "{}: this does not say how it was made, so --resume cannot go by it: another program or an older release \
+                 of longan made it; remove it, choose another folder, or replace it with --overwrite instead of --resume",
                 shown(output)
             )
-        })?;
-        let wanted = printable(&command(&self.inputs, input));
-        let same = made_by == wanted
-            || match [&made_by, &wanted].map(|command| parsed(command)) {
-                [Some(one), Some(other)] => {
-                    one.mapping.is_same(&other.mapping)
-                        && std::iter::zip(&one.inputs, &other.inputs).all(|(one, other)| is_same_file(one, other))
-                }
-                _ => false,
-            };
-        ensure!(
-            same,
-            "{}: this was made by `{made_by}`, and not as by `{wanted}`; choose another folder, or replace it with \
-             --overwrite instead of --resume",
-            shown(output)
-        );
-        // Of an input that is gone nothing else can be made.
-        let Ok(wanted) = self.mapping.input().way(input) else { return Ok(()) };
-        let way = match table.as_ref().and_then(|table| table.card(regridding::WAY)) {
-            Some(CardValue::Text(way)) => Some(way.trim_end().to_owned()),
-            _ => None,
         };
-        let named = |way: Option<String>| way.map_or("none".to_owned(), |way| format!("'{way}'"));
-        ensure!(
-            way == wanted,
-            "{}: the way in which its input came to HEALPix is {}, and would now be {}; choose another folder, or replace \
-             it with --overwrite instead of --resume",
-            shown(output),
-            named(way),
-            named(wanted)
-        );
-        Ok(())
+        let (made_by, wanted) = (made_by(&table).unwrap_or_default(), printable(&command(&self.inputs, input)));
+        let difference = match mapper.identity(input) {
+            Ok(now) => made.difference(&now).map(|difference| format!("it {difference}")),
+            // Of an input that is gone nothing else can be made.
+            Err(_) if !input.exists() => (made_by != wanted)
+                .then(|| format!("{} is gone, so that only the same command goes on with it", shown(input))),
+            Err(error) => return Err(error),
+        };
+        match difference {
+            None => Ok(()),
+            Some(difference) => bail!(
+                "{}: this was made by `{made_by}`, and not as by `{wanted}`: {difference}; choose another folder, or replace \
+                 it with --overwrite instead of --resume",
+                shown(output)
+            ),
+        }
     }
 
     fn one(&self, mapper: &Mapper<'_>, progress: &Progress, input: &Path, output: &Path) -> anyhow::Result<()> {
         let part = progress.part();
         let meanwhile = || {
-            self.check_finished(input, output)?;
+            self.check_finished(mapper, input, output)?;
             self.running.say(format_args!("{}: made by another run meanwhile", shown(output)))
         };
         // Of what this run began with, much may have been done by others.
@@ -271,14 +266,6 @@ fn printable(text: &str) -> String {
         _ => c.escape_default().to_string(),
     };
     text.trim_end().chars().map(plain).collect()
-}
-
-/// The arguments in a command.
-fn parsed(command: &str) -> Option<Arguments> {
-    match super::Arguments::try_parse_from(shlex::split(command)?).ok()?.command {
-        super::Command::Map(arguments) => Some(arguments),
-        _ => None,
-    }
 }
 
 /// A part of a list.

@@ -11,11 +11,11 @@ use longan_formats as formats;
 use longan_grid::Map;
 
 use super::input::Input;
+use super::map_writer::{self, Kind, LayoutOptions, MapColumn, Step, Table};
 use super::options::{Running, check_apart, decimals, shown};
-use super::output::{command, input_cards, mask_cards, text};
 use super::progress::Progress;
+use super::provenance::{command, input_cards, mask_cards, text};
 use super::regridding;
-use super::sink::{self, Kind, LayoutOptions, MapColumn, Step, Table};
 
 /// The map of a file as HEALPix, whatever it was, with nothing measured.
 #[derive(Args, Debug)]
@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         summary.add(map.values());
         Ok(of(path, map, input))
     };
-    sink::write(output, kind, layout, *overwrite, (0..steps).map(made))?;
+    map_writer::write(output, kind, layout, *overwrite, (0..steps).map(made))?;
     drop(progress);
     if let Some(warning) = warning {
         running.warn(warning);

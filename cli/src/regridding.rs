@@ -10,7 +10,7 @@ use longan_formats::Card;
 use longan_grid::{Gather, Map, Method, Regridded, Way};
 
 use super::options::{Running, shown};
-use super::output::{real, text};
+use super::provenance::{real, text};
 
 /// The header entry that names the way.
 pub(crate) const WAY: &str = "REGRID";

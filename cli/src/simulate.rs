@@ -8,9 +8,9 @@ use longan::simulate::{Body, Edge, Shape, Waves, scene, shapes};
 use longan_formats::{self as formats, Card};
 use longan_grid::{Healpix, Map, Ordering};
 
+use super::map_writer::{self, Kind, Layout, MapColumn, Step, Table};
 use super::options::{Running, acute, between, check_memory, finite, nside, shown, whole};
-use super::output::{creator, integer, real, text};
-use super::sink::{self, Kind, Layout, MapColumn, Step, Table};
+use super::provenance::{creator, integer, real, text};
 
 /// A map whose shape is known: bodies of simple outline, or a Gaussian random field.
 #[derive(Args, Debug)]
@@ -170,7 +170,7 @@ pub(crate) fn step(map: &Map, mut cards: Vec<Card>) -> Step {
 /// Writes one step in RING order.
 pub(crate) fn write(path: &Path, grid: Healpix, overwrite: bool, step: Step) -> anyhow::Result<()> {
     let layout = Layout { grid, ordering: Ordering::Ring, coordinates: None, float32: false, steps: 1 };
-    sink::write(path, Kind::of(path)?, layout, overwrite, [Ok(step)])
+    map_writer::write(path, Kind::of(path)?, layout, overwrite, [Ok(step)])
 }
 
 impl Output {

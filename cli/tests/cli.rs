@@ -32,6 +32,8 @@ mod refusals;
 mod reports;
 /// Several inputs, runs that go on where another ended, and runs that are killed.
 mod runs;
+/// Results that are no longer what would be made.
+mod stale;
 /// Fields with steps in time, and files of them.
 mod steps;
 

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use longan_grid::{CoordinateSystem, Healpix, Map, Regridded, Sphere, Time};
+use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Sphere, Time};
 
 use crate::describe::Description;
 use crate::error::Error;
@@ -20,11 +20,6 @@ pub trait Adapter: Sync {
     /// Whether a file that begins with `head` (at least the first 512 bytes, or all of a shorter file) is of this
     /// format. The file's name plays no part.
     fn recognises(&self, head: &[u8]) -> bool;
-
-    /// Whether such files may hold fields that come to HEALPix in one of several ways.
-    fn has_ways(&self) -> bool {
-        true
-    }
 
     /// The tables, variables and fields of a file.
     ///
@@ -85,6 +80,30 @@ impl About {
     }
 }
 
+/// The grid that maps are brought to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// The grid.
+    pub grid: Healpix,
+    /// The ordering that the maps have in the file; RING for those that are regridded.
+    pub ordering: Ordering,
+    /// The settings of regridding, the way first and every default resolved: `bilinear`, `min-valid=0.5`; empty for
+    /// fields that are on HEALPix.
+    pub settings: Vec<String>,
+}
+
+impl Target {
+    /// The target of a field that is regridded.
+    pub(crate) fn regridded(grid: Healpix, settings: Vec<String>) -> Self {
+        Target { grid, ordering: Ordering::Ring, settings }
+    }
+}
+
+/// The entry of a field in a [place](MapSeries::place).
+pub(crate) fn field_place(name: &str) -> String {
+    format!("field={name}")
+}
+
 /// The maps that a selection names: one, or one for each step in time, all on one grid.
 pub trait MapSeries {
     /// The times of the steps; one map without a time has none and counts as one step.
@@ -96,14 +115,15 @@ pub trait MapSeries {
     /// The memory that a map takes; nothing where that is not known before one is read.
     fn memory(&self) -> Option<MemoryEstimate>;
 
-    /// The way by which the maps come to HEALPix, where their field is on another grid or at points. A map that is read
-    /// has it too.
+    /// The place of the maps in their file: the table, the field and the places along other dimensions, such as `hdu=1`,
+    /// `field=z`, `level=500`. Two selections of the same maps have equal places, whether a choice is made or left out.
+    fn place(&self) -> Vec<String>;
+
+    /// The grid that maps are brought to, and how. This may read as much as a map does.
     ///
     /// # Errors
-    /// Where settings are missing or impossible.
-    fn regridded(&self) -> Result<Option<Regridded>, Error> {
-        Ok(None)
-    }
+    /// Where the file cannot be read, or settings are missing or impossible.
+    fn target(&mut self) -> Result<Target, Error>;
 
     /// Reads one map, by the number of its step from 0. Weights and other things that steps share are computed once.
     ///

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate};
+use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate, Target, field_place};
 use crate::columns::{self, Column};
 use crate::describe::{Description, GridDescription};
 use crate::error::{self, Error, ErrorKind, Reason};
@@ -88,7 +88,7 @@ impl Adapter for PointsCsv {
     fn describe(&self, path: &Path) -> Result<Description, Error> {
         let table = Table::open(path)?;
         // All points are counted, whatever values they have.
-        let samples = table.samples(table.header.position.columns()[0], None)?;
+        let (samples, _) = table.samples(table.header.position.columns()[0], None)?;
         let PointsSummary { spacing, nside, covered } = samples.summary()?;
         let (points, coordinates) = (samples.values.len(), table.header.system);
         let grid = GridDescription::Points { points, coordinates, spacing, nside, covered };
@@ -99,8 +99,15 @@ impl Adapter for PointsCsv {
         columns::check(selection)?;
         let table = Table::open(path)?;
         let values = columns::choose(&table.header.columns, selection.field.as_ref())?;
-        let samples = table.samples(values, selection.regrid.centre)?;
-        Ok(Box::new(SingleMap { table, values, samples, nside: selection.nside, regrid: selection.regrid.clone() }))
+        let (samples, centre) = table.samples(values, selection.regrid.centre)?;
+        Ok(Box::new(SingleMap {
+            table,
+            values,
+            samples,
+            centre,
+            nside: selection.nside,
+            regrid: selection.regrid.clone(),
+        }))
     }
 }
 
@@ -110,6 +117,8 @@ struct SingleMap {
     /// The column of values.
     values: usize,
     samples: Points,
+    /// The point from which points in space are seen.
+    centre: Option<[f64; 3]>,
     nside: Option<usize>,
     regrid: Regrid,
 }
@@ -119,8 +128,16 @@ impl MapSeries for SingleMap {
         &[]
     }
 
-    fn regridded(&self) -> Result<Option<Regridded>, Error> {
-        Ok(Some(self.samples.regridded(self.nside, &self.regrid)?))
+    fn place(&self) -> Vec<String> {
+        vec![field_place(&self.table.header.columns[self.values].name)]
+    }
+
+    fn target(&mut self) -> Result<Target, Error> {
+        let Regridded { way, grid, reach, .. } = self.samples.regridded(self.nside, &self.regrid)?;
+        let mut settings = vec![way.to_string()];
+        settings.extend(reach.map(|reach| format!("reach={reach}")));
+        settings.extend(self.centre.map(|[x, y, z]| format!("centre={x},{y},{z}")));
+        Ok(Target::regridded(grid, settings))
     }
 
     fn about(&self) -> About {
@@ -373,13 +390,13 @@ impl Table {
         Ok(points)
     }
 
-    /// The points that have a value in a column.
-    fn samples(&self, values: usize, centre: Option<[f64; 3]>) -> Result<Points, Error> {
+    /// The points that have a value in a column, and the centre from which points in space are seen.
+    fn samples(&self, values: usize, centre: Option<[f64; 3]>) -> Result<(Points, Option<[f64; 3]>), Error> {
         let mut points = self.points(values)?;
         // Points without a value count for the centre, which so is the same for all columns.
         let centre = match self.header.position {
-            Position::Angles { .. } => [0.0; 3],
-            Position::Cartesian(_) => directions::centre(centre, points.iter().map(|(point, ..)| *point))?,
+            Position::Angles { .. } => None,
+            Position::Cartesian(_) => Some(directions::centre(centre, points.iter().map(|(point, ..)| *point))?),
         };
         points.retain(|(_, value, _)| !value.is_nan());
         if points.is_empty() {
@@ -387,13 +404,13 @@ impl Table {
         }
         let mut samples = Points { directions: Vec::new(), values: Vec::new() };
         for (point, value, at) in points {
-            let Some((direction, _)) = from_centre(point, centre) else {
+            let Some((direction, _)) = from_centre(point, centre.unwrap_or_default()) else {
                 return Err(longan_grid::Error::AtCentre { place: self.place(at)? }.into());
             };
             samples.directions.push(direction);
             samples.values.push(value);
         }
-        Ok(samples)
+        Ok((samples, centre))
     }
 
     /// The point in a row, as seen from the centre or as a position, and its value in a column; nothing for a row that

@@ -20,7 +20,7 @@ use std::path::Path;
 use flate2::bufread::MultiGzDecoder;
 use tempfile::NamedTempFile;
 
-use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate};
+use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate, Target, field_place};
 use crate::cfitsio::FitsReader;
 use crate::describe::Description;
 use crate::error::{self, Error};
@@ -44,10 +44,6 @@ impl Adapter for HealpixFits {
     fn recognises(&self, head: &[u8]) -> bool {
         let inner = gunzipped_head(head);
         inner.as_deref().unwrap_or(head).starts_with(b"SIMPLE  =")
-    }
-
-    fn has_ways(&self) -> bool {
-        false
     }
 
     fn describe(&self, path: &Path) -> Result<Description, Error> {
@@ -85,6 +81,21 @@ impl MapSeries for SingleMap {
         let (name, unit) = (self.column.name.clone(), self.column.unit.clone());
         let quantity = self.column.quantity.clone();
         About { name, unit, coordinates: self.table.coordinates, sphere: Sphere::Sky, quantity }
+    }
+
+    fn place(&self) -> Vec<String> {
+        let mut place = vec![format!("hdu={}", self.table.hdu), field_place(&self.column.name)];
+        place.extend(read::plane(&self.table, &self.selection).map(|plane| format!("plane={plane}")));
+        place
+    }
+
+    fn target(&mut self) -> Result<Target, Error> {
+        let grid = match self.memory() {
+            Some(estimate) => Healpix::new(estimate.nside)?,
+            // The finest cell decides.
+            None => self.read(0)?.grid(),
+        };
+        Ok(Target { grid, ordering: self.table.ordering, settings: Vec::new() })
     }
 
     fn memory(&self) -> Option<MemoryEstimate> {

@@ -5,7 +5,7 @@
 
 use std::rc::Rc;
 
-use crate::adapter::{About, MapSeries, MemoryEstimate};
+use crate::adapter::{About, MapSeries, MemoryEstimate, Target};
 use crate::cf::{self, Horizontal};
 use crate::dataset::{self, Dataset, Kind, Variable};
 use crate::describe::{AxisDescription, GridDescription, TableDescription};
@@ -101,8 +101,13 @@ impl MapSeries for Series {
         self.chosen.times()
     }
 
-    fn regridded(&self) -> Result<Option<Regridded>, Error> {
-        Ok(Some(self.regridded))
+    fn place(&self) -> Vec<String> {
+        self.chosen.place(&self.dataset.variables()[self.variable])
+    }
+
+    fn target(&mut self) -> Result<Target, Error> {
+        let settings = vec![self.regridded.way.to_string(), format!("min-valid={}", self.min_valid)];
+        Ok(Target::regridded(self.to, settings))
     }
 
     fn about(&self) -> About {

@@ -16,6 +16,7 @@ mod error;
 mod gzip;
 mod healpix_cf;
 mod healpix_fits;
+mod input_record;
 mod interpret;
 mod latlon;
 mod libnetcdf;
@@ -33,7 +34,7 @@ mod units;
 mod zarr;
 mod zarr_zstd;
 
-pub use adapter::{About, Adapter, MapSeries, MemoryEstimate};
+pub use adapter::{About, Adapter, MapSeries, MemoryEstimate, Target};
 pub use card::{Card, CardValue};
 pub use describe::{
     AxisDescription, Description, DimensionDescription, FieldDescription, GridDescription, Indexing, TableDescription,
@@ -41,10 +42,11 @@ pub use describe::{
 };
 pub use error::{Ask, Error, ErrorKind};
 pub use healpix_fits::{Column, Extension, HealpixFile, HealpixLayout, HealpixWriter, write_healpix};
+pub use input_record::{InputRecord, Role};
 pub use names::is_alike;
 pub use netcdf_write::{NetcdfColumn, NetcdfLayout, NetcdfWriter, TimeAxis};
 pub use quantity::StatedQuantity;
-pub use registry::{describe, has_ways, is_store, open, read};
+pub use registry::{describe, is_store, open, read};
 pub use request::{At, Field, Place, Selection};
 pub use save::{abandon, check_writable, save, tidy};
 pub use units::differ as units_differ;

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate};
+use crate::adapter::{About, Adapter, MapSeries, MemoryEstimate, Target, field_place};
 use crate::columns::{self, Column};
 use crate::describe::{Description, GridDescription};
 use crate::error::{self, Error, ErrorKind, Reason};
@@ -92,10 +92,6 @@ impl Adapter for SurfacePly {
         first.trim_ascii_end() == b"ply" && first.len() < head.len()
     }
 
-    fn has_ways(&self) -> bool {
-        false
-    }
-
     fn describe(&self, path: &Path) -> Result<Description, Error> {
         let mut input = BufReader::new(File::open(path).map_err(Error::io("open it"))?);
         let header = Header::parse(&mut input)?;
@@ -134,6 +130,17 @@ impl MapSeries for SingleMap {
 
     fn about(&self) -> About {
         About { name: self.name.clone(), unit: None, coordinates: None, sphere: Sphere::Body, quantity: None }
+    }
+
+    fn place(&self) -> Vec<String> {
+        vec![field_place(&self.name)]
+    }
+
+    fn target(&mut self) -> Result<Target, Error> {
+        let (grid, [x, y, z]) = self.surface.grid_and_centre(self.nside, &self.regrid)?;
+        let mut settings = vec![format!("centre={x},{y},{z}")];
+        settings.extend(self.regrid.allow_folds.then(|| "allow-folds".to_owned()));
+        Ok(Target::regridded(grid, settings))
     }
 
     fn memory(&self) -> Option<MemoryEstimate> {

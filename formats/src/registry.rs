@@ -71,16 +71,6 @@ pub fn read(path: &Path, selection: &Selection) -> Result<Map, Error> {
 pub fn describe(path: &Path) -> Result<Description, Error> {
     adapter(path).and_then(|adapter| adapter.describe(path)).map_err(|e| e.with_path(path))
 }
-
-/// Whether a file, from its first bytes, may hold fields that come to HEALPix in one of several ways, as
-/// [`MapSeries::regridded`] tells.
-///
-/// # Errors
-/// Where the file cannot be read. The error names the file.
-pub fn has_ways(path: &Path) -> Result<bool, Error> {
-    adapter(path).map(|adapter| adapter.has_ways()).map_err(|e| e.with_path(path))
-}
-
 /// Whether a path is a folder that is read as if it were a file: a Zarr store.
 pub fn is_store(path: &Path) -> bool {
     path.is_dir() && zarr::is_zarr(path)

@@ -160,7 +160,8 @@ impl Points {
         let nside = nside.or_else(|| spacing.map(closest_nside)).ok_or(Error::OnePlace)?;
         let reach = reach.or_else(|| spacing.map(|spacing| REACH * spacing)).ok_or(Error::OnePlace)?;
         let grid = Healpix::new(nside)?;
-        let (gather, regridded) = regridded::gather(spacing, grid, regrid.gather);
+        let (gather, mut regridded) = regridded::gather(spacing, grid, regrid.gather);
+        regridded.reach = Some(reach.to_degrees());
         Ok(Plan { places, grid, reach, gather, regridded })
     }
 

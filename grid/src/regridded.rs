@@ -49,6 +49,8 @@ pub struct Regridded {
     pub grid: Healpix,
     /// Whether the outer halves of the outermost cells are left out, as interpolation ends at the outermost points.
     pub without_rim: bool,
+    /// Pixels farther than this from any point are masked, in degrees.
+    pub reach: Option<f64>,
     /// Of means of points, the share of pixels that hold none and take the value of the nearest; known once a map is made.
     pub empty: f64,
 }
@@ -86,6 +88,7 @@ pub fn method(from: &LatLon, to: Healpix, asked: Option<Method>) -> (Method, Reg
         spacing: Some(spacing),
         grid: to,
         without_rim: method == Method::Bilinear && !from.is_global(),
+        reach: None,
         empty: 0.0,
     };
     (method, regridded)
@@ -101,7 +104,8 @@ pub(crate) fn gather(spacing: Option<f64>, to: Healpix, asked: Option<Gather>) -
     };
     let gather = asked.unwrap_or(suits);
     let by_default = asked.is_none();
-    (gather, Regridded { way: Way::Points(gather), by_default, spacing, grid: to, without_rim: false, empty: 0.0 })
+    let way = Way::Points(gather);
+    (gather, Regridded { way, by_default, spacing, grid: to, without_rim: false, reach: None, empty: 0.0 })
 }
 
 /// Whether pixels are finer than a spacing in degrees.

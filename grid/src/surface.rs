@@ -124,6 +124,15 @@ impl Surface {
         Err(Error::Crossings { never: percent(never), several: percent(several) })
     }
 
+    /// The grid that [`regrid`](Self::regrid) would make a map on, and the centre that the surface would be seen from.
+    ///
+    /// # Errors
+    /// [`Error::AtCentre`] or [`Error::OnePlace`].
+    pub fn grid_and_centre(&self, nside: Option<usize>, regrid: &Regrid) -> Result<(Healpix, [f64; 3]), Error> {
+        let view = self.view(regrid.centre)?;
+        Ok((view.grid(nside)?, view.centre))
+    }
+
     /// The view from a centre, the mean of the vertices unless given.
     fn view(&self, centre: Option<[f64; 3]>) -> Result<View, Error> {
         let mut used = vec![false; self.vertices.len()];

@@ -30,6 +30,9 @@ mod rank4;
 mod registry;
 pub mod testing;
 
+use std::fmt;
+use std::path::PathBuf;
+
 use num_complex::Complex64;
 
 pub use catalogue::{Catalogue, CatalogueError, split};
@@ -91,8 +94,30 @@ pub enum Origin {
     Program,
     /// A formula, with its text.
     Formula(String),
-    /// A plugin, with its name, version and file.
-    Plugin(String),
+    /// A plugin.
+    Plugin(PluginOrigin),
+}
+
+/// The plugin that a measure is from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PluginOrigin {
+    /// The name.
+    pub name: String,
+    /// The plugin's own version.
+    pub version: String,
+    /// The library.
+    pub path: PathBuf,
+}
+
+impl fmt::Display for PluginOrigin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} ({})", self.name, self.version, self.path.display())
+    }
+}
+
+/// The name of the column in a file for a measure of this name: `EVQ_DIRECTION` for `evq-direction`.
+pub fn column_of(name: &str) -> String {
+    name.to_uppercase().replace(['-', ':'], "_")
 }
 
 /// The moments of one window, the mean over the thresholds.
@@ -182,7 +207,7 @@ pub trait Measure: Send + Sync {
 
     /// The name of the measure's column in a file: `EVQ_DIRECTION`.
     fn column(&self) -> String {
-        self.name().to_uppercase().replace(['-', ':'], "_")
+        column_of(&self.name())
     }
 
     /// The origin of the measure.

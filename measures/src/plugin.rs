@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use libloading::Library;
 
+use crate::PluginOrigin;
 use description::Described;
 use interface::{LONGAN_INTERFACE, LonganDescribe, LonganHandshake};
 use measure::Message;
@@ -61,7 +62,7 @@ impl Plugin {
         let library = open(&absolute).map_err(error)?;
         let (name, version, described) = describe(&library).map_err(error)?;
         let library = Arc::new(library);
-        let origin = format!("{name} {version} ({})", path.display());
+        let origin = PluginOrigin { name: name.clone(), version: version.clone(), path: path.to_owned() };
         let measures = described.into_iter().map(|described| PluginMeasure {
             name: described.name.clone(),
             described: Arc::new(described),

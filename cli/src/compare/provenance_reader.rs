@@ -4,44 +4,38 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 use longan::measures::Quantity;
-use longan::{ThresholdUnit, Weight};
+use longan::{Recipe, ThresholdUnit, Weight};
 use longan_formats::{
-    self as formats, Card, CardValue, Field, FieldDescription, GridDescription, Selection, TableDescription,
+    self as formats, At, Card, CardValue, Field, FieldDescription, GridDescription, Selection, TableDescription,
     TablePlace, is_alike, units_differ,
 };
 use longan_grid::{CoordinateSystem, Map};
 
+use super::super::identity::{INPUTS, Identity, RECIPE};
 use super::super::mismatch::of_coordinates;
 use super::super::options::{is_same_file, shown};
-use super::super::output::{card, integer, numbered, real};
+use super::super::provenance::{card, integer, numbered, real};
 use super::super::quantity::of_measure;
 use super::super::regridding;
-
-/// Thresholds in standard deviations, counted back from the map's unit, are the same within this.
-const SAME_THRESHOLD: f64 = 1e-6;
 
 /// A file of Minkowski maps.
 pub(super) struct MadeFrom {
     /// The file.
     pub(super) path: PathBuf,
-    /// Their Nside.
-    pub(super) nside: usize,
+    /// How they were made.
+    pub(super) recipe: Recipe,
     /// Their coordinate system, where the file names one.
     pub(super) coordinates: Option<CoordinateSystem>,
     /// Their columns.
     pub(super) columns: Vec<Column>,
-    /// Facts that have to be the same in all files, each with its name and value.
-    facts: Vec<(&'static str, String)>,
     /// The unit in which thresholds were given: sigma, or the map's.
     threshold_unit: String,
-    /// How masks were applied, each setting with its name and value.
-    masking: Vec<(&'static str, String)>,
-    /// Nside of the map that was measured.
-    pub(super) input_nside: String,
-    /// The way in which that map came to HEALPix; empty where the file does not say it.
-    pub(super) way: String,
+    /// The place along other dimensions, of which the maps are.
+    at: Vec<At>,
+    /// The file of the mask; empty where there was none.
+    mask: String,
     /// The spacing of what it was made of, in sides of a pixel, where the file says it.
     pub(super) ratio: Option<f64>,
     /// Entries that the comparison's header repeats.
@@ -57,6 +51,8 @@ pub(super) struct Column {
     pub(super) quantity: Quantity,
     /// Radius of its windows in degrees, where the file tells.
     pub(super) window: Option<f64>,
+    /// The measure as it was asked for: a name, or a formula.
+    made: String,
     /// The thresholds that it is of, in the unit in which they were given.
     thresholds: Vec<f64>,
     /// The FITS extension that it is in.
@@ -68,8 +64,8 @@ pub(super) struct Column {
 impl Column {
     /// One that is still to be made.
     pub(super) fn to_be(name: String, unit: &str, quantity: Quantity) -> Self {
-        let field = name.clone();
-        Column { name, unit: unit.to_owned(), quantity, window: None, thresholds: Vec::new(), hdu: None, field }
+        let (field, made, thresholds) = (name.clone(), name.clone(), Vec::new());
+        Column { name, unit: unit.to_owned(), quantity, window: None, made, thresholds, hdu: None, field }
     }
 
     /// Refuses what cannot be compared.
@@ -105,21 +101,19 @@ impl Column {
     /// Refuses another column that was not made in the same way.
     fn check_same(&self, path: &Path, other: &Column, other_path: &Path, unit: &str) -> anyhow::Result<()> {
         let window = |column: &Column| column.window.map(|window| format!("{window} degrees")).unwrap_or_default();
-        let count = |column: &Column| column.thresholds.len().to_string();
+        let thresholds = |column: &Column| {
+            let listed: Vec<String> = column.thresholds.iter().map(f64::to_string).collect();
+            format!("{} {unit}", listed.join(", ")).trim_end().to_owned()
+        };
         let facts = [
             ("a window of".to_owned(), window(self), window(other)),
-            ("the number of thresholds".to_owned(), count(self), count(other)),
+            ("the measure".to_owned(), self.made.clone(), other.made.clone()),
+            ("thresholds".to_owned(), thresholds(self), thresholds(other)),
             (format!("{} in the unit", self.name), self.unit.clone(), other.unit.clone()),
         ];
         for (what, mine, others) in &facts {
             ensure!(mine == others, differ(what, (path, mine), (other_path, others)));
         }
-        let near = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME_THRESHOLD * (1.0 + a.abs());
-        let [mine, others] = [self, other].map(|column| listed(&column.thresholds, unit));
-        ensure!(
-            self.thresholds.iter().zip(&other.thresholds).all(near),
-            differ("thresholds", (path, &mine), (other_path, &others))
-        );
         Ok(())
     }
 }
@@ -144,7 +138,7 @@ impl MadeFrom {
     ///
     /// # Errors
     /// Where it cannot be read, or its maps have several times.
-    pub(super) fn of(path: &Path, hdu: Option<usize>) -> anyhow::Result<Option<Self>> {
+    pub(super) fn of(path: &Path, hdu: Option<usize>, at: &[At]) -> anyhow::Result<Option<Self>> {
         let tables = formats::describe(path)?.tables;
         let is_asked_for = |table: &&TableDescription| match table.place {
             TablePlace::Hdu { hdu: this, .. } => hdu.is_none_or(|hdu| hdu == this),
@@ -152,38 +146,65 @@ impl MadeFrom {
         };
         let tables: Vec<_> = tables.iter().filter(is_asked_for).filter(|table| is_minkowski(table)).collect();
         let Some(first) = tables.first() else { return Ok(None) };
-        check_times(path, &tables)?;
+        if at.is_empty() {
+            check_times(path, &tables)?;
+        }
         let several = tables.len() > 1 && matches!(first.place, TablePlace::Hdu { .. });
-        let columns = tables.iter().flat_map(|table| columns(table, several)).collect();
-        Ok(Some(Self::of_table(path, first, columns)))
+        let identity = Identity::stated(first).with_context(|| shown(path))?;
+        let Some(Identity { recipe, .. }) = identity else {
+            bail!(
+                "{}: an older release of longan made this Minkowski map, whose values may differ; make it again",
+                shown(path)
+            )
+        };
+        let columns = tables.iter().flat_map(|table| columns(table, &recipe, several)).collect();
+        Ok(Some(Self { at: at.to_owned(), ..Self::of_table(path, first, recipe, columns) }))
     }
 
-    fn of_table(path: &Path, table: &TableDescription, columns: Vec<Column>) -> Self {
+    fn of_table(path: &Path, table: &TableDescription, recipe: Recipe, columns: Vec<Column>) -> Self {
         let word = |key: &str| table.card(key).map(words).unwrap_or_default();
-        let GridDescription::Healpix { nside, coordinates, .. } = table.grid else { unreachable!("a Minkowski map") };
-        let formulas: Vec<String> =
-            table.cards.iter().filter(|card| card.key.starts_with("FORMUL")).map(|card| words(&card.value)).collect();
-        let sigma = word("THRUNIT") == ThresholdUnit::Sigma.name();
+        let GridDescription::Healpix { coordinates, .. } = table.grid else { unreachable!("a Minkowski map") };
+        let sigma = recipe.threshold_unit == ThresholdUnit::Sigma.name();
         MadeFrom {
             path: path.to_owned(),
-            nside,
             coordinates,
-            facts: vec![
-                ("Nside", nside.to_string()),
-                ("the body's side", word("BODY")),
-                ("the weight", word("WEIGHT")),
-                ("the unit of thresholds", word("THRUNIT")),
-                ("the least contour in window radii", table.card("MINCONT").map_or("0".to_owned(), words)),
-                ("the formulas", formulas.join("; ")),
-            ],
             threshold_unit: if sigma { "sigma".to_owned() } else { word("INUNIT") },
-            masking: MASKING.map(|(key, what)| (what, word(key))).to_vec(),
-            input_nside: word("INNSIDE"),
-            way: word(regridding::WAY),
+            mask: word("MASKFILE"),
+            at: Vec::new(),
             ratio: table.card(regridding::RATIO).and_then(number),
-            repeated: repeated(table, &columns),
+            repeated: repeated(table, &recipe, &columns),
+            recipe,
             columns,
         }
+    }
+
+    /// The way in which the field came to HEALPix; empty where it was there.
+    pub(super) fn way(&self) -> &str {
+        self.recipe.field.regridding.first().map_or("", String::as_str)
+    }
+
+    /// The choices that have to be the same in all files, each with its name and value.
+    fn facts(&self) -> [(&'static str, String); 6] {
+        let Recipe { revision, nside_out, body, weight, threshold_unit, min_contour, .. } = &self.recipe;
+        [
+            ("values of the revision", revision.to_string()),
+            ("Nside", nside_out.to_string()),
+            ("the body's side", body.clone()),
+            ("the weight", weight.clone()),
+            ("the unit of thresholds", threshold_unit.clone()),
+            ("the least contour in window radii", min_contour.to_string()),
+        ]
+    }
+
+    /// How masks were applied, each setting with its name and value.
+    fn masking(&self) -> [(&'static str, String); 3] {
+        let Recipe { field, max_masked, .. } = &self.recipe;
+        let threshold = field.mask.iter().find_map(|setting| setting.strip_prefix("threshold="));
+        [
+            ("the mask", self.mask.clone()),
+            ("the mask threshold", threshold.unwrap_or_default().to_owned()),
+            ("the largest masked share", max_masked.to_string()),
+        ]
     }
 
     /// Whether another file was made in the same way.
@@ -192,12 +213,12 @@ impl MadeFrom {
     /// Where a fact differs: the fact, both files and both values.
     pub(super) fn check(&self, other: &MadeFrom, ignore_coordsys: bool) -> anyhow::Result<()> {
         let (path, other_path) = (&*self.path, &*other.path);
-        for (what, mine) in &self.facts {
-            let others = other.facts.iter().find(|(same, _)| same == what).map_or("", |(_, value)| value);
-            ensure!(mine == others, differ(what, (path, mine), (other_path, others)));
+        for ((what, mine), (_, others)) in std::iter::zip(self.facts(), other.facts()) {
+            ensure!(mine == others, differ(what, (path, &mine), (other_path, &others)));
         }
-        if !self.way.is_empty() && !other.way.is_empty() {
-            ensure!(self.way == other.way, differ("the way to HEALPix", (path, &self.way), (other_path, &other.way)));
+        let [mine, others] = [self, other].map(MadeFrom::way);
+        if !mine.is_empty() && !others.is_empty() {
+            ensure!(mine == others, differ("the way to HEALPix", (path, mine), (other_path, others)));
         }
         let (unit, other_unit) = (&self.threshold_unit, &other.threshold_unit);
         ensure!(
@@ -218,9 +239,10 @@ impl MadeFrom {
         let same = |mine: &str, others: &str| {
             mine == others || !mine.is_empty() && !others.is_empty() && is_same_file(mine.as_ref(), others.as_ref())
         };
-        let different = self.masking.iter().zip(&other.masking).filter(|((_, mine), (_, others))| !same(mine, others));
+        let both = std::iter::zip(self.masking(), other.masking());
+        let different = both.filter(|((_, mine), (_, others))| !same(mine, others));
         let [mine, others] = different
-            .map(|((what, mine), (_, others))| [mine, others].map(|value| format!("{what} {}", or_none(value))))
+            .map(|((what, mine), (_, others))| [mine, others].map(|value| format!("{what} {}", or_none(&value))))
             .fold([Vec::new(), Vec::new()], |[mut mine, mut others], [one, other]| {
                 mine.push(one);
                 others.push(other);
@@ -251,7 +273,8 @@ impl MadeFrom {
     /// Where it cannot be read.
     pub(super) fn read(&self, column: &Column) -> Result<Map, formats::Error> {
         let Column { hdu, field, .. } = self.column(column).unwrap_or(column).clone();
-        formats::read(&self.path, &Selection { field: Some(Field::Name(field)), hdu, ..Selection::default() })
+        let at = self.at.clone();
+        formats::read(&self.path, &Selection { field: Some(Field::Name(field)), hdu, at, ..Selection::default() })
     }
 }
 
@@ -260,8 +283,8 @@ fn check_times(path: &Path, tables: &[&TableDescription]) -> anyhow::Result<()> 
     let along = tables.iter().find_map(|table| table.dimensions.first());
     if let Some(time) = along {
         bail!(
-            "{}: there are maps for {} places along '{}', and a comparison takes one; make them of one alone, with \
-             `longan map --select {}=...`",
+            "{}: there are maps for {} places along '{}', and a comparison takes one; choose one, such as with \
+             --select {}=#0",
             shown(path),
             time.len,
             time.name,
@@ -291,30 +314,20 @@ fn check_times(path: &Path, tables: &[&TableDescription]) -> anyhow::Result<()> 
 }
 
 /// The columns of a table. Where it is one of `several` their names have its.
-fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
-    let real = |key: &str| table.card(key).and_then(number);
+fn columns(table: &TableDescription, recipe: &Recipe, several: bool) -> Vec<Column> {
     let word = |key: &str| table.card(key).map(words).unwrap_or_default();
-    let raw: Vec<f64> = (1..).map_while(|i| real(&format!("THR{i}"))).collect();
-    let given = match (word("THRUNIT") == ThresholdUnit::Sigma.name(), real("INMEAN"), real("INSIGMA")) {
-        (true, Some(mean), Some(sigma)) => raw.iter().map(|threshold| (threshold - mean) / sigma).collect(),
-        _ => raw,
-    };
-    // A file without a header for each threshold lists all of them: "-1, 0, 1 sigma".
-    let all: Vec<f64> =
-        word("THRESHOLDS").split(',').map_while(|x| x.split_whitespace().next()?.parse().ok()).collect();
     let windows: Vec<f64> = word("WINDOW").split(',').filter_map(|window| window.trim().parse().ok()).collect();
-    let weight = if word("WEIGHT") == Weight::Curvature.name() { Weight::Curvature } else { Weight::Length };
+    let weight = if recipe.weight == Weight::Curvature.name() { Weight::Curvature } else { Weight::Length };
     let column = |field: &FieldDescription| {
-        let (hdu, name, own) = match &table.place {
-            TablePlace::Hdu { hdu, name } => {
-                (Some(*hdu), field.name.clone(), name.as_deref().filter(|_| several).map(|own| format!("_{own}")))
-            }
+        let (hdu, field_name, own) = match &table.place {
+            TablePlace::Hdu { hdu, name } => (Some(*hdu), field.name.clone(), name.as_deref()),
             TablePlace::Variable { variable } => (None, variable.clone(), None),
             TablePlace::File {} => (None, field.name.clone(), None),
         };
-        let field_name = name.clone();
         let legal = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-        let name = name + &own.unwrap_or_default().chars().map(legal).collect::<String>();
+        let own: String = own.iter().flat_map(|own| ["_", own]).flat_map(str::chars).map(legal).collect();
+        let whole = field_name.clone() + &own;
+        let name = if several { whole.clone() } else { field_name.clone() };
         let window = match windows[..] {
             [window] => Some(window),
             _ => windows.iter().copied().find(|window| {
@@ -322,26 +335,24 @@ fn columns(table: &TableDescription, several: bool) -> Vec<Column> {
                 name.split_once(&part).is_some_and(|(_, rest)| rest.is_empty() || rest.starts_with("_T"))
             }),
         };
-        let place = name.rsplit_once(PARTS[1]).and_then(|(_, place)| place.parse::<usize>().ok());
-        let thresholds = match place.and_then(|place| all.get(place.checked_sub(1)?)) {
+        let place = whole.rsplit_once(PARTS[1]).and_then(|(_, place)| place.split('_').next()?.parse::<usize>().ok());
+        let thresholds = match place.and_then(|place| recipe.thresholds.get(place.checked_sub(1)?)) {
             Some(threshold) => vec![*threshold],
-            None if given.is_empty() => all.clone(),
-            None => given.clone(),
+            None => recipe.thresholds.clone(),
         };
+        let bare = PARTS.iter().find_map(|part| Some(field_name.split_once(part)?.0)).unwrap_or(&field_name);
+        let made = recipe.measures.iter().find(|measure| is_alike(&measure.column(), bare));
+        let made = made.map_or_else(|| bare.to_owned(), ToString::to_string);
         let unit = field.unit.clone().unwrap_or_default();
         let quantity = of_measure(field.quantity.as_ref(), &name, &unit).weighted(weight);
-        Column { name, unit, quantity, window, thresholds, hdu, field: field_name }
+        Column { name, unit, quantity, window, made, thresholds, hdu, field: field_name }
     };
     table.fields.iter().map(column).collect()
 }
 
-/// How masks are applied, by the entries of headers that say it.
-const MASKING: [(&str, &str); 3] =
-    [("MASKFILE", "the mask"), ("MASKTHR", "the mask threshold"), ("MAXMASK", "the largest masked share")];
-
 /// The entries of a table's header that the header of a comparison of these columns repeats.
-fn repeated(table: &TableDescription, columns: &[Column]) -> Vec<Card> {
-    const KEYS: [&str; 17] = [
+fn repeated(table: &TableDescription, recipe: &Recipe, columns: &[Column]) -> Vec<Card> {
+    const KEYS: [&str; 19] = [
         "INFILE",
         "INFIELD",
         "INUNIT",
@@ -359,6 +370,8 @@ fn repeated(table: &TableDescription, columns: &[Column]) -> Vec<Card> {
         "WEIGHT",
         "THRUNIT",
         "WINDOW",
+        RECIPE,
+        INPUTS,
     ];
     let note = "of the map measured, or of how";
     let mut windows: Vec<String> = Vec::new();
@@ -378,8 +391,9 @@ fn repeated(table: &TableDescription, columns: &[Column]) -> Vec<Card> {
     let mut cards: Vec<Card> = KEYS.into_iter().filter_map(repeat).collect();
     cards.push(integer("NTHRESH", thresholds.len(), "number of thresholds"));
     let number = |key| table.card(key).and_then(number);
-    let (zero, one) = match (table.card("THRUNIT").map(words).as_deref(), number("INMEAN"), number("INSIGMA")) {
-        (Some("sigma"), Some(mean), Some(sigma)) => (mean, sigma),
+    let in_sigma = recipe.threshold_unit == ThresholdUnit::Sigma.name();
+    let (zero, one) = match (in_sigma, number("INMEAN"), number("INSIGMA")) {
+        (true, Some(mean), Some(sigma)) => (mean, sigma),
         _ => (0.0, 1.0),
     };
     let threshold =
@@ -388,13 +402,8 @@ fn repeated(table: &TableDescription, columns: &[Column]) -> Vec<Card> {
     cards
 }
 
-/// The name of the file that a file's maps were made of, from their header.
-pub(super) fn made_of(path: &Path) -> anyhow::Result<Option<String>> {
-    Ok(formats::describe(path)?.tables.first().and_then(|table| table.card("INFILE")).map(words))
-}
-
 /// Whether these are Minkowski maps of longan.
-fn is_minkowski(table: &TableDescription) -> bool {
+pub(super) fn is_minkowski(table: &TableDescription) -> bool {
     let longan = matches!(table.card("CREATOR"), Some(CardValue::Text(creator)) if creator.starts_with("longan "));
     longan && table.card("WINDOW").is_some() && matches!(table.grid, GridDescription::Healpix { .. })
 }
@@ -416,12 +425,4 @@ fn number(value: &CardValue) -> Option<f64> {
         CardValue::Integer(number) => Some(*number as f64),
         CardValue::Text(_) | CardValue::Logical(_) => None,
     }
-}
-
-/// Thresholds, for people.
-fn listed(thresholds: &[f64], unit: &str) -> String {
-    let round = |x: &f64| ((x / SAME_THRESHOLD).round() * SAME_THRESHOLD * 1e6).round() / 1e6;
-    let thresholds: Vec<String> =
-        thresholds.iter().map(|x| if x.abs() < 1e6 { round(x) } else { *x }.to_string()).collect();
-    format!("{} {unit}", thresholds.join(", ")).trim_end().to_owned()
 }

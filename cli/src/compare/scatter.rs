@@ -102,7 +102,7 @@ impl Scatter {
     pub(super) fn check(&self, data: &MadeFrom) -> anyhow::Result<()> {
         let pair = self.pair(&data.columns)?.map(|i| &data.columns[i]);
         let maps = [data.read(pair[0])?.into_values(), data.read(pair[1])?.into_values()];
-        let grid = Healpix::new(data.nside)?;
+        let grid = Healpix::new(data.recipe.nside_out)?;
         self.check_point(&data.path, grid, self.point(grid, [&maps[0], &maps[1]]), pair)
     }
 

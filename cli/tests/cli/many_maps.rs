@@ -6,7 +6,7 @@ use super::*;
 
 impl Folder {
     /// One with simulated maps `sims/0.fits` and so on.
-    fn with_sims(count: usize, nside: usize) -> Self {
+    pub(super) fn with_sims(count: usize, nside: usize) -> Self {
         let folder = Folder::new();
         std::fs::create_dir(folder.path("sims")).unwrap();
         for i in 0..count {

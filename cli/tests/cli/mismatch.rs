@@ -331,7 +331,7 @@ fn maps_of_several_times_are_refused_with_a_remedy() {
             std::fs::copy(folder.path(&names[0]), folder.path(copy)).unwrap();
         }
         let words = format!("compare {} -o out.fits", names.join(" "));
-        folder.refused(&words, &[&format!("maps.{end}: there are maps for 3 "), "`longan map --select time="]);
+        folder.refused(&words, &[&format!("maps.{end}: there are maps for 3 "), "--select time="]);
     }
     folder.refused("compare maps.fits one.fits two.fits -o out.fits", &["--hdu (1 to 3)"]);
     folder.done("compare maps.fits one.fits two.fits -o out.fits --hdu 2");

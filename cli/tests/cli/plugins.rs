@@ -51,7 +51,7 @@ fn in_rust() -> [PathBuf; 3] {
 }
 
 /// The example in C, in this folder.
-fn in_c(folder: &Folder, flags: &[&str]) -> PathBuf {
+pub(super) fn in_c(folder: &Folder, flags: &[&str]) -> PathBuf {
     let flags: Vec<String> = flags.iter().map(|flag| (*flag).to_owned()).collect();
     let include = sources().join("measures/include");
     let source = sources().join("examples/plugin-c/axis_ratio.c");

@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::coordinates::{Axis, coordinate_of, scalar_time};
 use super::time::TimeUnits;
 use super::unpack::values;
+use crate::adapter::field_place;
 use crate::dataset::{Array, Dataset, Dimension, Kind, Variable};
 use crate::error::{Ask, Error, ErrorKind, Reason};
 use crate::names::is_alike;
@@ -140,6 +141,18 @@ impl Labels {
         }
     }
 
+    /// A name of places in their order, which no other places of the dimension have.
+    fn name(&self, places: &[usize]) -> String {
+        match places {
+            &[place] => {
+                let name = self.show(place);
+                if self.matching(&name) == [place] { name } else { format!("#{place}") }
+            }
+            _ if places.len() == self.len() => "all".to_owned(),
+            _ => places.iter().map(|place| format!("#{place}")).collect::<Vec<_>>().join(","),
+        }
+    }
+
     /// All values, or the first and the last of many.
     pub(crate) fn listed(&self) -> String {
         let len = self.len();
@@ -213,12 +226,19 @@ pub(crate) struct Chosen {
     /// The dimension of time and its places, where there are several steps.
     series: Option<(usize, Vec<usize>)>,
     times: Vec<Time>,
+    /// The names of the places, such as `level=500`.
+    names: Vec<String>,
 }
 
 impl Chosen {
     /// The times of the steps: none where there is no time, which is one step.
     pub(crate) fn times(&self) -> &[Time] {
         &self.times
+    }
+
+    /// The variable and the places, for [`MapSeries::place`](crate::adapter::MapSeries::place).
+    pub(crate) fn place(&self, variable: &Variable) -> Vec<String> {
+        std::iter::once(field_place(&variable.path())).chain(self.names.iter().cloned()).collect()
     }
 
     /// The ranges of indices of one step, the whole of the sphere.
@@ -255,7 +275,8 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
             return Err(Problem::SelectedTwice { dimension: name.escape_debug().to_string() }.into());
         }
     }
-    let mut chosen = Chosen { places: vec![None; dimensions.len()], series: None, times: Vec::new() };
+    let places = vec![None; dimensions.len()];
+    let mut chosen = Chosen { places, series: None, times: Vec::new(), names: Vec::new() };
     for (number, dimension) in dimensions.iter().enumerate().filter(|(number, _)| !sphere.contains(number)) {
         let name = || dimension.name.clone();
         let labels = Labels::of(dataset, variable, dimension)?;
@@ -285,6 +306,7 @@ pub(crate) fn select(dataset: &dyn Dataset, variable: &Variable, sphere: &[usize
             }
         };
         chosen.places[number] = Some(places[0]);
+        chosen.names.push(format!("{}={}", dimension.name, labels.name(&places)));
         if is_time {
             if let Labels::Times(times, _) = &labels {
                 chosen.times = places.iter().map(|&place| times[place].clone()).collect();

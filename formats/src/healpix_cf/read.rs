@@ -7,7 +7,7 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use super::grid::{Grid, Scheme, Unsaid};
-use crate::adapter::{About, MapSeries, MemoryEstimate};
+use crate::adapter::{About, MapSeries, MemoryEstimate, Target};
 use crate::cf;
 use crate::dataset::{Array, Attribute, Dataset, Variable};
 use crate::describe::{GridDescription, Indexing};
@@ -125,6 +125,21 @@ impl MapSeries for Field {
         let coordinates = coordinates(&*self.dataset);
         let sphere = if coordinates.is_some() { Sphere::Sky } else { Sphere::Earth };
         About { name, unit, coordinates, sphere, quantity: StatedQuantity::of(variable) }
+    }
+
+    fn place(&self) -> Vec<String> {
+        self.chosen.place(&self.dataset.variables()[self.variable])
+    }
+
+    fn target(&mut self) -> Result<Target, Error> {
+        let (grid, ordering) = match &self.cells {
+            Cells::All(grid, ordering) | Cells::Some(grid, ordering, _) => (*grid, *ordering),
+            Cells::Sizes(places, _) => {
+                let nside = self.nside.unwrap_or_else(|| finest(places.iter().copied()));
+                (Healpix::new(nside)?, Ordering::Nested)
+            }
+        };
+        Ok(Target { grid, ordering, settings: Vec::new() })
     }
 
     fn memory(&self) -> Option<MemoryEstimate> {

@@ -28,7 +28,7 @@ pub(super) fn read(fits: &mut FitsReader, table: &Table, column: &Column, select
 }
 
 /// The plane (energy band) of a sparse table that a field's number names, the first unless given.
-fn plane(table: &Table, selection: &Selection) -> Option<usize> {
+pub(super) fn plane(table: &Table, selection: &Selection) -> Option<usize> {
     table.sparse.then_some(match selection.field {
         Some(Field::Number(number)) => number,
         _ => 0,

@@ -9,14 +9,14 @@ use num_complex::Complex64;
 
 use super::description::Described;
 use super::interface::{LONGAN_TEXT_SIZE, LonganComplex, LonganWindow, LonganWindows};
-use crate::{Measure, MeasureError, Needs, Origin, Quantity, Window};
+use crate::{Measure, MeasureError, Needs, Origin, PluginOrigin, Quantity, Window};
 
 /// A measure of a plugin.
 #[derive(Clone)]
 pub struct PluginMeasure {
     pub(super) name: String,
     pub(super) described: Arc<Described>,
-    pub(super) origin: String,
+    pub(super) origin: PluginOrigin,
     // Last, since fields are dropped in their order: nothing of a library may be there without it.
     pub(super) _library: Arc<Library>,
 }

@@ -1,6 +1,6 @@
 //! Minkowski maps of raw maps, made on the way to a comparison and kept for the next one.
 //!
-//! How one is made is left to [`mapping`](super::super::mapping).
+//! How one is made is left to [`mapping`](super::super::map_options).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,19 +9,17 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail, ensure};
 use longan::measures::Measure;
-use longan_formats::{self as formats, Error};
+use longan_formats as formats;
 
-use super::super::mapping::Mapping;
+use super::super::identity::{Difference, Identity};
+use super::super::map_options::{Mapper, Mapping};
+use super::super::map_writer::Kind;
 use super::super::options::{Running, is_same_file, shown};
-use super::super::output::command;
 use super::super::parallel::Jobs;
 use super::super::progress::Progress;
+use super::super::provenance::command;
 use super::super::regridding;
-use super::super::sink::Kind;
-use super::provenance_reader::{MadeFrom, made_of};
-
-/// Name of the file that says by which options the Minkowski maps of a folder are made.
-const OPTIONS: &str = "options.txt";
+use super::provenance_reader::{MadeFrom, is_minkowski};
 
 /// Makes the Minkowski maps that the folder does not hold yet; what all of them say of themselves.
 pub(super) fn minkowski_maps(
@@ -35,7 +33,7 @@ pub(super) fn minkowski_maps(
     let mapper = mapping.mapper(measures, jobs.memory(), running, true)?;
     let outputs = outputs(folder, inputs)?;
     for path in inputs {
-        if MadeFrom::of(path, mapping.input().hdu).is_ok_and(|said| said.is_some()) {
+        if MadeFrom::of(path, mapping.input().hdu, &[]).is_ok_and(|said| said.is_some()) {
             bail!("{}: this is a Minkowski map of longan already; compare it without --work", shown(path));
         }
         let steps = mapping.input().open(path)?.steps();
@@ -46,8 +44,7 @@ pub(super) fn minkowski_maps(
         );
     }
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot make this folder", shown(folder)))?;
-    record(folder, mapping, &outputs)?;
-    let tasks = tasks(inputs, &outputs, mapping.mask())?;
+    let tasks = tasks(inputs, &outputs, &mapper, running)?;
     let all: Vec<PathBuf> = inputs.iter().map(|input| input.to_path_buf()).collect();
     let progress = Progress::of_parts(tasks.len(), running.quiet || tasks.is_empty());
     let told = regridding::Said::default();
@@ -63,7 +60,7 @@ pub(super) fn minkowski_maps(
     // The others are done, and are not done again when this one can be.
     made.into_iter().collect::<anyhow::Result<()>>()?;
     let said = |output: &PathBuf| {
-        MadeFrom::of(output, None)?
+        MadeFrom::of(output, None, &[])?
             .with_context(|| format!("{}: this is no Minkowski map of longan; remove it", shown(output)))
     };
     outputs.iter().map(said).collect()
@@ -96,61 +93,48 @@ fn outputs(folder: &Path, inputs: &[&Path]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(outputs)
 }
 
-/// Notes the options in the folder, unless they are there already.
-fn record(folder: &Path, mapping: &Mapping, outputs: &[PathBuf]) -> anyhow::Result<()> {
-    let path = folder.join(OPTIONS);
-    let options = format!(
-        "The Minkowski maps in this folder are made by longan {} with these options.\n{:#?}\n",
-        env!("CARGO_PKG_VERSION"),
-        mapping.plain()
-    );
-    match fs::read(&path) {
-        Ok(old) => ensure!(
-            old == options.as_bytes(),
-            "{}: the Minkowski maps there are made by other options, which {OPTIONS} lists; choose another folder for \
-             --work, or remove this one",
-            shown(folder)
-        ),
-        Err(_) => {
-            if let Some(output) = outputs.iter().find(|output| output.exists()) {
-                bail!(
-                    "{}: nothing in its folder says by which options it is made; choose another folder for --work",
-                    shown(output)
-                );
-            }
-            formats::save(&path, false, |path| fs::write(path, &options).map_err(Error::io("write it")))?;
-        }
-    }
-    Ok(())
-}
-
-/// The Minkowski maps that are still to be made: those that do not exist, or whose input or mask has changed since.
+/// The Minkowski maps that are still to be made: those that do not exist, or whose files have changed since.
 fn tasks<'a>(
     inputs: &[&'a Path],
     outputs: &'a [PathBuf],
-    mask: Option<&Path>,
+    mapper: &Mapper<'_>,
+    running: &Running,
 ) -> anyhow::Result<Vec<(&'a Path, &'a Path)>> {
     let mut tasks: Vec<(&Path, &Path)> = Vec::new();
+    let mut of_other_releases = 0;
     for (input, output) in inputs.iter().zip(outputs) {
         if output.exists() {
-            let from = made_of(output)?.unwrap_or_default();
-            ensure!(
-                is_same_file(Path::new(&from), input),
-                "{}: it is made of {from}, not of {}; choose another folder for --work",
-                shown(output),
-                shown(input)
-            );
-            let changed = |path: &Path| path.metadata().and_then(|metadata| metadata.modified()).ok();
-            let since = |path: &Path| {
-                changed(path).is_none_or(|changed_at| changed(output).is_none_or(|made| changed_at > made))
-            };
-            if !std::iter::once(*input).chain(mask).any(since) {
-                continue;
+            let made = made(output).with_context(|| shown(output))?;
+            match made.map(|made| anyhow::Ok(made.difference(&mapper.identity(input)?))).transpose()? {
+                Some(None) => continue,
+                Some(Some(Difference::Changed(_))) => (),
+                None | Some(Some(Difference::Release)) => of_other_releases += 1,
+                Some(Some(difference @ Difference::Choice(..))) => bail!(
+                    "{}: made by other options: it {difference}; choose another folder for --work, or remove this one",
+                    shown(output)
+                ),
+                Some(Some(difference @ Difference::File(..))) => {
+                    bail!("{}: it {difference}; choose another folder for --work", shown(output))
+                }
             }
         }
         if !tasks.iter().any(|(_, other)| other == output) {
             tasks.push((*input, output));
         }
     }
+    if of_other_releases > 0 {
+        running.note(format_args!(
+            "{of_other_releases} of the Minkowski maps in the folder of --work are of another release of longan, whose values \
+             may differ; they are made again"
+        ));
+    }
     Ok(tasks)
+}
+
+/// The identity of Minkowski maps, unless a release without recipes made them.
+fn made(output: &Path) -> anyhow::Result<Option<Identity>> {
+    let tables = formats::describe(output)?.tables;
+    let minkowski = tables.iter().find(|table| is_minkowski(table));
+    let table = minkowski.context("this is no Minkowski map of longan, and --work would replace it; remove it")?;
+    Identity::stated(table)
 }

@@ -10,22 +10,24 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Args;
-use longan::measures::{self, Catalogue, CatalogueError, Measure, split};
+use longan::measures::{Catalogue, CatalogueError, Measure, Origin, PluginOrigin, split};
 use longan::statistics::Statistics;
 use longan::window::{Summation, SummationCounts};
-use longan::{Analysis, AnalysisError, Block, MinkowskiMaps, ThresholdUnit};
-use longan_formats::MemoryEstimate;
+use longan::{Analysis, AnalysisError, Block, FieldRecipe, MinkowskiMaps, ThresholdUnit};
+use longan_formats::{InputRecord, MemoryEstimate, Role, Target};
 use longan_grid::{Healpix, Map};
 
-use super::input::{Input, Mask};
+use super::identity::Identity;
+use super::input::{Input, Mask, Series};
+use super::map_writer::{self, Kind, LayoutOptions};
 use super::options::{
-    BodyOptions, ContourOption, Running, WeightOption, between, check_memory, decimals, is_same_file, nside, shown,
+    BodyOptions, ContourOption, Running, WeightOption, between, check_memory, decimals, nside, shown,
 };
-use super::output::Provenance;
 use super::parallel::Memory;
 use super::plugin::Plugins;
+use super::provenance::Provenance;
 use super::regridding;
-use super::sink::{self, Kind, LayoutOptions};
+use super::remedies::of_mask;
 use super::{mismatch, misused};
 
 /// What of a file is measured, how, and in which layout the result is written.
@@ -90,36 +92,22 @@ impl Mapping {
         running: &'a Running,
         several: bool,
     ) -> anyhow::Result<Mapper<'a>> {
-        let (mask, analysis) = (self.input.mask(running)?, self.analysis());
-        Ok(Mapper { mapping: self, measures, mask, analysis, memory, running, several })
-    }
-
-    /// Whether these options ask for the same as others, in whatever way they are given; but for how fields come to
-    /// HEALPix, which may be left to the field.
-    pub(crate) fn is_same(&self, other: &Mapping) -> bool {
-        let [one, other] = [self, other].map(|mapping| {
-            let mut mapping = mapping.plain();
-            mapping.input.leave_out_ways();
-            let usual = |text: &str| if text.contains('=') { text.to_owned() } else { measures::usual(text) };
-            mapping.measure = mapping.measure.iter().flat_map(|list| split(list)).map(usual).collect();
-            if mapping.measure.is_empty() {
-                mapping.measure.push(DEFAULT.to_owned());
+        // The state of the files is that from before they are read.
+        let mut records = Vec::new();
+        if let Some(mask) = self.mask() {
+            records.push(InputRecord::of_data(Role::Mask, mask).map_err(of_mask)?);
+        }
+        let mut plugins: Vec<PathBuf> = Vec::new();
+        for measure in &measures {
+            if let Origin::Plugin(PluginOrigin { path, .. }) = measure.origin()
+                && !plugins.contains(&path)
+            {
+                records.push(InputRecord::of_plugin(&path)?);
+                plugins.push(path);
             }
-            let masks: Vec<PathBuf> = mapping.input.mask.take().into_iter().collect();
-            let plugins = std::mem::take(&mut mapping.plugins.plugin);
-            (mapping, masks, plugins)
-        });
-        let same = |these: &[PathBuf], those: &[PathBuf]| {
-            these.len() == those.len() && std::iter::zip(these, those).all(|(this, that)| is_same_file(this, that))
-        };
-        one.0 == other.0 && same(&one.1, &other.1) && same(&one.2, &other.2)
-    }
-
-    /// These options without those that make no difference to what is made, but to what is refused.
-    pub(crate) fn plain(&self) -> Self {
-        let mut plain = self.clone();
-        plain.input.ignore_coordsys = false;
-        plain
+        }
+        let (mask, analysis) = (self.input.mask(running)?, self.analysis());
+        Ok(Mapper { mapping: self, measures, mask, records, analysis, memory, running, several })
     }
 
     /// The measures asked for, as they were.
@@ -200,6 +188,8 @@ pub(crate) struct Mapper<'a> {
     mapping: &'a Mapping,
     measures: Vec<Arc<dyn Measure>>,
     mask: Option<Mask>,
+    /// The mask's file and those of plugins.
+    records: Vec<InputRecord>,
     analysis: Analysis,
     memory: Memory,
     running: &'a Running,
@@ -220,6 +210,29 @@ pub(crate) struct Made {
 }
 
 impl Mapper<'_> {
+    /// The identity of what would be made of a file now.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, or not as it is asked for.
+    pub(crate) fn identity(&self, path: &Path) -> anyhow::Result<Identity> {
+        let record = InputRecord::of_data(Role::Map, path)?;
+        self.identity_of(&mut self.mapping.input.open(path)?, record)
+    }
+
+    /// The identity of what is made of the maps of a file in a state.
+    fn identity_of(&self, series: &mut Series, record: InputRecord) -> anyhow::Result<Identity> {
+        let Target { grid, ordering, settings } = series.target()?;
+        let mut recipe = self.analysis.recipe(grid, &self.measures)?;
+        recipe.field = FieldRecipe {
+            place: series.place(),
+            regridding: settings,
+            mask: self.mask.as_ref().map(|mask| mask.settings.clone()).unwrap_or_default(),
+            layout: self.mapping.layout.settings(ordering),
+        };
+        let inputs = std::iter::once(record).chain(self.records.iter().cloned()).collect();
+        Ok(Identity { recipe, inputs })
+    }
+
     /// Maps one file to one file. `command` goes into its header; `progress` is told the share done, from 0 to 1.
     pub(crate) fn map(
         &self,
@@ -229,7 +242,8 @@ impl Mapper<'_> {
         command: &str,
         progress: impl Fn(f64),
     ) -> anyhow::Result<Made> {
-        let Mapper { mapping, measures, mask, analysis, memory, running, several } = self;
+        let Mapper { mapping, measures, mask, analysis, memory, running, several, .. } = self;
+        let record = InputRecord::of_data(Role::Map, path)?;
         let mut series = mapping.input.open(path)?;
         let _taken =
             memory.take(series.memory().and_then(|estimate| self.bytes(estimate))).with_context(|| shown(path))?;
@@ -242,6 +256,7 @@ impl Mapper<'_> {
         let layout = mapping.layout.layout(&map, grid, kind, steps).with_context(about)?;
         let tables = self.tables();
         check_memory(grid, tables * measures.len()).with_context(about)?;
+        let identity = &self.identity_of(&mut series, record)?;
         let note = regridding::note(&map);
         let mut warnings: Vec<String> = regridding::warning(path, &map).into_iter().collect();
         let mut first = Some(map);
@@ -259,6 +274,7 @@ impl Mapper<'_> {
                 ControlFlow::Continue(())
             };
             let maps = match analysis.minkowski_maps(&map, measures, told) {
+                // One step without shape does not end a series.
                 Err(AnalysisError::AllMasked | AnalysisError::Constant { .. }) if steps > 1 => {
                     empty.push(map.time.as_ref().map(|time| time.label.clone()).unwrap_or_default());
                     analysis.undefined(&map, measures).with_context(about)?
@@ -273,9 +289,10 @@ impl Mapper<'_> {
             }
             summary.add(&maps, &map, analysis);
             let input = Some(&mapping.input);
-            Ok(Provenance { path, map: &map, input, analysis, command: command.to_owned() }.step(&maps, measures))
+            let command = command.to_owned();
+            Ok(Provenance { path, map: &map, input, analysis, identity, command }.step(&maps, measures))
         };
-        sink::write(output, kind, layout, overwrite, (0..steps).map(made))?;
+        map_writer::write(output, kind, layout, overwrite, (0..steps).map(made))?;
         warnings.extend(empty.first().map(|one| {
             let (about, n) = (about(), empty.len());
             let others = if n > 1 { format!(" and {} other steps", n - 1) } else { String::new() };

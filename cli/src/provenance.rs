@@ -9,10 +9,11 @@ use longan::{Analysis, Block, MinkowskiMaps, ThresholdUnit};
 use longan_formats::{Card, CardValue, NetcdfColumn};
 use longan_grid::Map;
 
+use super::identity::Identity;
 use super::input::Input;
+use super::map_writer::{MapColumn, Step, Table};
 use super::quantity::stated;
 use super::regridding;
-use super::sink::{MapColumn, Step, Table};
 
 /// What is said in headers about a map and its analysis.
 pub(crate) struct Provenance<'a> {
@@ -24,6 +25,8 @@ pub(crate) struct Provenance<'a> {
     pub(crate) input: Option<&'a Input>,
     /// What was done with it.
     pub(crate) analysis: &'a Analysis,
+    /// The same, and the files, as one value.
+    pub(crate) identity: &'a Identity,
     /// The command that did it.
     pub(crate) command: String,
 }
@@ -59,7 +62,7 @@ fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
     for measure in measures {
         match measure.as_ref().origin() {
             Origin::Formula(formula) => formulas.push(formula),
-            Origin::Plugin(plugin) if !plugins.contains(&plugin) => plugins.push(plugin),
+            Origin::Plugin(plugin) if !plugins.contains(&plugin.to_string()) => plugins.push(plugin.to_string()),
             Origin::Plugin(_) | Origin::Program => (),
         }
     }
@@ -199,6 +202,7 @@ impl Provenance<'_> {
         for (i, threshold) in thresholds.iter().enumerate().filter(|_| known) {
             cards.push(real(&format!("THR{}", i + 1), *threshold, "threshold, in the unit of the field"));
         }
+        cards.extend(self.identity.cards());
         cards.push(text("COMMAND", self.command.clone(), "command that made this file"));
         cards
     }
@@ -206,13 +210,16 @@ impl Provenance<'_> {
 
 /// What is said of the map that a file is made of.
 pub(crate) fn input_cards(path: &Path, map: &Map) -> Vec<Card> {
-    let mut cards = vec![
-        creator(),
-        text("INFILE", path.to_string_lossy(), "file analysed"),
+    let mut cards = vec![creator()];
+    // Maps in memory have no file.
+    if !path.as_os_str().is_empty() {
+        cards.push(text("INFILE", path.to_string_lossy(), "file analysed"));
+    }
+    cards.extend([
         text("INFIELD", map.name.clone(), "field analysed"),
         text("INUNIT", map.unit.clone().unwrap_or_default(), "its unit"),
         integer("INNSIDE", map.grid().nside(), "its Nside"),
-    ];
+    ]);
     cards.extend(regridding::cards(map));
     cards
 }

@@ -13,10 +13,10 @@ use longan_formats::{
 use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Time};
 
 use super::options::shown;
-use super::output::text;
+use super::provenance::text;
 
 /// How maps are laid out in files.
-#[derive(Args, Clone, Debug, PartialEq)]
+#[derive(Args, Clone, Debug, Default, PartialEq)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct LayoutOptions {
     /// Ordering of the output [default: the input's].
@@ -123,13 +123,27 @@ pub(crate) struct Layout {
 }
 
 impl LayoutOptions {
-    /// The layout of a file of maps on a grid that are made from a map.
-    pub(crate) fn layout(&self, map: &Map, grid: Healpix, kind: Kind, steps: usize) -> anyhow::Result<Layout> {
-        let ordering = match self.ordering {
+    /// The layout of maps that are made from one of an ordering, in words.
+    pub(crate) fn settings(&self, ordering: Ordering) -> Vec<String> {
+        let ordering = match self.ordering_for(ordering) {
+            Ordering::Ring => "ring",
+            Ordering::Nested => "nested",
+        };
+        std::iter::once(ordering).chain(self.float32.then_some("float32")).map(str::to_owned).collect()
+    }
+
+    /// The ordering of maps that are made from one of an ordering.
+    fn ordering_for(&self, input: Ordering) -> Ordering {
+        match self.ordering {
             Some(OrderingOption::Ring) => Ordering::Ring,
             Some(OrderingOption::Nested) => Ordering::Nested,
-            None => map.ordering,
-        };
+            None => input,
+        }
+    }
+
+    /// The layout of a file of maps on a grid that are made from a map.
+    pub(crate) fn layout(&self, map: &Map, grid: Healpix, kind: Kind, steps: usize) -> anyhow::Result<Layout> {
+        let ordering = self.ordering_for(map.ordering);
         let nside = grid.nside();
         if ordering == Ordering::Nested && !grid.has_nested() {
             bail!("an output Nside of {nside} is not a power of two, which NESTED needs; add --ordering ring");
