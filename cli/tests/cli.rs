@@ -110,6 +110,19 @@ impl Folder {
         ran(self.command(words))
     }
 
+    /// Runs until the system kills it, for it writes a file beyond so many bytes.
+    #[cfg(unix)]
+    #[track_caller]
+    fn killed(&self, words: &str, bytes: u64) {
+        let mut command = Command::new("sh");
+        command.args(["-c", "ulimit -c 0; ulimit -f $0; exec \"$@\"", &(bytes / 512).to_string()]);
+        command.arg(env!("CARGO_BIN_EXE_longan")).args(shlex::split(words).expect("quotes that match"));
+        let ended = command.current_dir(self.root()).stdin(Stdio::null()).stdout(Stdio::null()).status().unwrap();
+        let signal = std::os::unix::process::ExitStatusExt::signal(&ended);
+        // Its number is that of Linux and macOS.
+        assert_eq!(signal, Some(25), "longan {words}: {ended}, and not by SIGXFSZ");
+    }
+
     /// Runs without any complaint; what was printed.
     #[track_caller]
     pub(crate) fn done(&self, words: &str) -> String {
