@@ -237,6 +237,7 @@ fn a_cube_from_the_library_is_compared() {
             Ok((map, maps))
         });
         longan_cli::write_minkowski_maps(&folder.path(name), false, &analysis, &measures, steps).unwrap();
+        unlock(&folder.path(name));
     };
     (0..4).for_each(|seed| cube(&format!("{seed}.nc"), seed));
     let compare = "compare 0.nc 1.nc 2.nc 3.nc -o out.nc";
