@@ -167,7 +167,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             }
             made(&inputs)?
         }
-        None => arguments.said()?,
+        None => arguments.made_from()?,
     };
     let (data, simulations) = files.split_first().context("data")?;
     let ignore_coordsys = arguments.mapping.input().ignore_coordsys;
@@ -307,15 +307,15 @@ impl Arguments {
         }
 
         if let Some(other) = simulations.iter().find(|other| other.way().is_empty() != data.way().is_empty()) {
-            let said = |file: &MadeFrom| {
+            let way = |file: &MadeFrom| {
                 if file.way().is_empty() { "does not say".to_owned() } else { format!("says '{}'", file.way()) }
             };
             self.running.warn(format_args!(
                 "of how its input came to HEALPix, {} {}, and {} {}; shapes depend on it",
                 shown(&data.path),
-                said(data),
+                way(data),
                 shown(&other.path),
-                said(other)
+                way(other)
             ));
         }
         let apart = |other: &&MadeFrom| match (data.ratio, other.ratio) {
@@ -340,12 +340,12 @@ impl Arguments {
     }
 
     /// The provenance of all files, each of which holds Minkowski maps.
-    fn said(&self) -> anyhow::Result<Vec<MadeFrom>> {
+    fn made_from(&self) -> anyhow::Result<Vec<MadeFrom>> {
         let Input { hdu, select: at, .. } = self.mapping.input();
-        let said =
+        let all =
             self.inputs().map(|path| Ok((path, MadeFrom::of(path, *hdu, at)?))).collect::<anyhow::Result<Vec<_>>>()?;
-        if let Some((path, _)) = said.iter().find(|(_, said)| said.is_none()) {
-            match said.iter().find(|(_, said)| said.is_some()) {
+        if let Some((path, _)) = all.iter().find(|(_, made)| made.is_none()) {
+            match all.iter().find(|(_, made)| made.is_some()) {
                 Some((other, _)) => bail!(
                     "{} is a Minkowski map of longan, but {} is none; compare one kind with itself",
                     shown(other),
@@ -357,7 +357,7 @@ impl Arguments {
                 ),
             }
         }
-        Ok(said.into_iter().filter_map(|(_, said)| said).collect())
+        Ok(all.into_iter().filter_map(|(_, made)| made).collect())
     }
 
     /// The columns to compare: those asked for, or those that all files have.

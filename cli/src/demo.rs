@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     say(format!("\nMaps and the picture waves_evq.png are in {}", shown(folder)))
 }
 
-/// What is written of Minkowski maps.
+/// The step of a file with Minkowski maps.
 fn minkowski(
     maps: &MinkowskiMaps,
     map: &Map,

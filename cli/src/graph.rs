@@ -112,7 +112,7 @@ fn region(text: &str) -> Result<Region, RegionError> {
     text.parse()
 }
 
-/// The curves of one map, with what is said of the map.
+/// The curves of one map, and its description.
 struct MapCurves {
     /// The file of the map.
     path: PathBuf,
@@ -151,7 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
 
     let progress = Progress::new(shown(&arguments.output), arguments.running.quiet);
-    let told = regridding::Said::default();
+    let told = regridding::Notices::default();
     let mut done = 0;
     let mut all_of =
         |files: &[PathBuf], keep: &mut dyn FnMut(MapCurves) -> Result<(), GraphError>| -> anyhow::Result<()> {

@@ -1,6 +1,6 @@
 //! The identity of Minkowski maps: their recipe and the files that they are made of, as headers state it.
 //!
-//! What follows from a difference is left to the commands.
+//! The commands decide what follows from a difference.
 
 use std::fmt;
 

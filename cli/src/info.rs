@@ -18,7 +18,7 @@ use super::input::place;
 use super::options::{Format, decimals, nside, print, shown};
 use super::remedies;
 
-/// What a file holds: its grids, dimensions and coordinate systems, and each field's unit, range and masked fraction.
+/// Describes a file: its grids, dimensions and coordinate systems, and each field's unit, range and masked fraction.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// File of maps: FITS, NetCDF, Zarr, CSV, PLY.
@@ -50,7 +50,7 @@ struct Table<'a> {
 
 #[derive(Serialize)]
 struct FieldReport<'a> {
-    /// What --variable takes for its name: its number in its table, or that of the variable in the file.
+    /// The value that --variable takes for its name: its number in its table, or that of the variable in the file.
     #[serde(skip)]
     number: usize,
     #[serde(flatten)]
@@ -63,7 +63,7 @@ struct FieldReport<'a> {
     /// The time that these numbers are of, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<String>,
-    /// What it holds where that is no map.
+    /// The content of a table that is no map.
     #[serde(skip_serializing_if = "Option::is_none")]
     not_a_map: Option<String>,
     /// Why there are no numbers of the place that is selected.
@@ -78,7 +78,7 @@ struct FieldReport<'a> {
 enum Unread {
     NotAMap(String),
     Select,
-    /// What is selected is not there.
+    /// The selected place is not there.
     Elsewhere(String),
 }
 
@@ -146,7 +146,7 @@ fn report<'a>(arguments: &Arguments, description: &'a Description) -> anyhow::Re
     Ok(Report { format: description.format, tables })
 }
 
-/// What the fields of a table are called: a variable by its path.
+/// The names of the fields of a table; that of a variable is its path.
 fn names(table: &TableDescription) -> Vec<&str> {
     match &table.place {
         TablePlace::Variable { variable } => vec![variable],
@@ -252,7 +252,7 @@ fn write_grid(out: &mut String, grid: &GridDescription) -> std::fmt::Result {
                 Indexing::Explicit => format!("{stored} of {pixels} pixels, by their numbers"),
                 Indexing::MultiOrder => format!("{stored} cells of several sizes (UNIQ)"),
             };
-            let coordinates = coordinates.map_or("not said".to_owned(), |c| format!("{c:?}").to_lowercase());
+            let coordinates = coordinates.map_or("not stated".to_owned(), |c| format!("{c:?}").to_lowercase());
             writeln!(out, "  Nside        {nside} ({pixels} pixels, one every {:.4} deg)", spacing(*nside))?;
             writeln!(out, "  ordering     {ordering}{assumed}")?;
             writeln!(out, "  coordinates  {coordinates}")?;

@@ -138,8 +138,8 @@ impl Input {
         self.mask.as_ref().map(mask).transpose()
     }
 
-    /// Refuses maps whose units differ where thresholds are in the map's unit. Files that cannot be read are passed over,
-    /// as it is said of each by itself.
+    /// Refuses maps whose units differ where thresholds are in the map's unit. Files that cannot be read are passed over:
+    /// the run complains of each later.
     pub(crate) fn check_units(&self, paths: &[PathBuf], unit: ThresholdUnit) -> anyhow::Result<()> {
         if unit == ThresholdUnit::Sigma || paths.len() < 2 {
             return Ok(());

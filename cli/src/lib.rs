@@ -1,5 +1,5 @@
 //! The command line of longan: one file a command, which reads arguments and files, calls the libraries, writes and
-//! prints. What it computes stands in the libraries.
+//! prints. All computation is left to the libraries.
 //!
 //! Exit status: 0 all done; 1 a file could not be read, analysed or written (others of the run may be done); 2 the
 //! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
@@ -118,7 +118,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What clap says about an argument, for one that only makes sense together with others.
+/// An error as clap reports those of arguments, for arguments that make no sense together.
 fn misused(command: &str, problem: String) -> anyhow::Error {
     let mut arguments = Arguments::command();
     arguments.build();

@@ -1,6 +1,6 @@
 //! `longan map`: Minkowski maps of one or many files.
 //!
-//! What is made of a file is left to [`mapping`](super::map_options).
+//! The way of one file to its Minkowski maps is left to [`map_options`](super::map_options).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -253,8 +253,8 @@ fn is_exists(error: &Error) -> bool {
 
 /// The command that made an output of `longan map`, as its header says.
 fn made_by(table: &TableDescription) -> Option<String> {
-    let said = table.card("COMMAND").or_else(|| table.card("HISTORY"))?;
-    let CardValue::Text(text) = said else { return None };
+    let command = table.card("COMMAND").or_else(|| table.card("HISTORY"))?;
+    let CardValue::Text(text) = command else { return None };
     // Other programs may have added lines to a history.
     text.lines().find(|line| line.starts_with("longan map ")).map(printable)
 }

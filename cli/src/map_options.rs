@@ -30,7 +30,7 @@ use super::regridding;
 use super::remedies::of_mask;
 use super::{mismatch, misused};
 
-/// What of a file is measured, how, and in which layout the result is written.
+/// The field that is measured, the analysis, and the layout of the result.
 #[derive(Args, Clone, Debug, PartialEq)]
 pub(crate) struct Mapping {
     /// Measures, separated by commas, such as evq,psi2-direction, and formulas of them, such as
@@ -84,7 +84,7 @@ const DEFAULT: &str = "evq";
 const COLUMNS_MAX: usize = 999;
 
 impl Mapping {
-    /// What maps files, once it is clear that the mask can be read.
+    /// A mapper of files, once the mask has been opened.
     pub(crate) fn mapper<'a>(
         &'a self,
         measures: Vec<Arc<dyn Measure>>,
@@ -178,7 +178,7 @@ pub(crate) fn find(catalogue: &Catalogue, text: &str, command: &str) -> anyhow::
     })
 }
 
-/// What is said of a text that names no measure that can be taken.
+/// The complaint about a text that names no measure that can be taken.
 pub(crate) fn no_measure(text: &str, problem: impl fmt::Display, command: &str) -> anyhow::Error {
     misused(command, format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
 }
@@ -197,7 +197,7 @@ pub(crate) struct Mapper<'a> {
     several: bool,
 }
 
-/// What is made of one file.
+/// The outcome for one file.
 pub(crate) struct Made {
     /// The Minkowski maps, in a few words.
     pub(crate) summary: String,
@@ -205,7 +205,7 @@ pub(crate) struct Made {
     pub(crate) ways: Vec<String>,
     /// How the map came to HEALPix, where that is another way than the usual one.
     pub(crate) note: Option<String>,
-    /// What a user should know.
+    /// Warnings for the user.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -320,7 +320,7 @@ impl Mapper<'_> {
     }
 }
 
-/// What Minkowski maps hold, in a few words: of what thresholds, which values, and which windows have none.
+/// A summary of Minkowski maps in a few words: thresholds, values, and windows without any.
 struct Summary {
     /// Whether the measure is an angle, of which there is no median.
     is_angle: bool,
@@ -392,11 +392,11 @@ impl Summary {
 
     /// The thresholds in both units.
     fn at(&self) -> String {
-        let said = |range: Option<[f64; 2]>, unit: &str| {
+        let words = |range: Option<[f64; 2]>, unit: &str| {
             let [low, high] = range?.map(short);
             Some(if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") })
         };
-        let [sigma, value] = [said(self.thresholds[0], " sigma"), said(self.thresholds[1], &self.unit)];
+        let [sigma, value] = [words(self.thresholds[0], " sigma"), words(self.thresholds[1], &self.unit)];
         let of = if self.of == 1 { "at".to_owned() } else { format!("at {} thresholds,", self.of) };
         match (sigma, value) {
             (Some(sigma), Some(value)) => format!(", {of} {sigma} = {value}"),

@@ -84,7 +84,7 @@ pub(crate) fn warn(running: &Running, path: &Path, map: &Map, analysis: &Analysi
     if running.quiet {
         return;
     }
-    let once = if several { " (this is said of the first such map only)" } else { "" };
+    let once = if several { " (only the first such map is named)" } else { "" };
     if map.sphere == Sphere::Sky && is_stokes(&map.name) {
         running.warn_once(
             Topic::Stokes,
@@ -110,7 +110,7 @@ fn is_stokes(name: &str) -> bool {
     parameters.len() == 1 && others.iter().all(|word| BESIDE_STOKES.contains(word))
 }
 
-/// What is doubtful about thresholds.
+/// The doubt about thresholds, in words.
 fn of_thresholds(doubt: Doubt, analysis: &Analysis, unit: Option<&str>) -> String {
     let values = analysis.thresholds.values();
     let (first, last) = (values[0], values[values.len() - 1]);

@@ -21,7 +21,7 @@ pub(crate) struct BodyOptions {
     /// Thresholds: n from lo to hi, evenly or logarithmically spaced, or a list [default: -3:3:13 in sigma].
     #[arg(long, value_name = "lo:hi:n|log:lo:hi:n|a,b,c", allow_hyphen_values = true)]
     pub(crate) thresholds: Option<Thresholds>,
-    /// What thresholds are counted in: standard deviations of the unmasked pixels from their mean, or the
+    /// Unit of the thresholds: standard deviations of the unmasked pixels from their mean, or the
     /// map's unit [default: value where --thresholds is given, else sigma].
     #[arg(long, value_name = "UNIT")]
     pub(crate) threshold_unit: Option<UnitOption>,
@@ -111,12 +111,12 @@ pub(crate) struct Running {
     /// Print nothing but errors.
     #[arg(long, short)]
     pub(crate) quiet: bool,
-    /// What has been warned of.
+    /// The topics that this run has warned of.
     #[arg(skip)]
     warned: Arc<Mutex<HashSet<Topic>>>,
 }
 
-/// What many maps of one run may be warned of.
+/// A topic of which a run warns once, however many maps there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Topic {
     /// A map of Stokes Q or U.

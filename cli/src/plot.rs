@@ -1,6 +1,6 @@
 //! `longan plot`: a picture of a map.
 //!
-//! What is drawn, and how, is left to [`longan_picture`].
+//! The drawing itself is left to [`longan_picture`].
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -294,12 +294,12 @@ impl Arguments {
             return label.clone();
         }
         // The title may have the name already.
-        let is_said = self.title.is_none() && map.long_name.is_none();
+        let is_free = self.title.is_none() && map.long_name.is_none();
         let unit = map.unit.as_deref().map(str::trim).filter(|unit| !["", "1"].contains(unit));
         match unit.map(printed) {
-            Some(unit) if is_said => unit,
+            Some(unit) if is_free => unit,
             Some(unit) => format!("{} [{unit}]", map.name.trim()),
-            None if is_said => String::new(),
+            None if is_free => String::new(),
             None => map.name.trim().to_owned(),
         }
     }

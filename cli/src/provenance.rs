@@ -15,7 +15,7 @@ use super::map_writer::{MapColumn, Step, Table};
 use super::quantity::stated;
 use super::regridding;
 
-/// What is said in headers about a map and its analysis.
+/// The facts that headers state about a map and its analysis.
 pub(crate) struct Provenance<'a> {
     /// The input file.
     pub(crate) path: &'a Path,
@@ -23,7 +23,7 @@ pub(crate) struct Provenance<'a> {
     pub(crate) map: &'a Map,
     /// Where it came from.
     pub(crate) input: Option<&'a Input>,
-    /// What was done with it.
+    /// The analysis.
     pub(crate) analysis: &'a Analysis,
     /// The same, and the files, as one value.
     pub(crate) identity: &'a Identity,
@@ -80,7 +80,7 @@ pub(crate) fn numbered(keyword: &str, number: usize) -> String {
 }
 
 impl Provenance<'_> {
-    /// What is written of the Minkowski maps of one step.
+    /// The Minkowski maps of one step, with their headers.
     pub(crate) fn step(&self, maps: &MinkowskiMaps, measures: &[impl AsRef<dyn Measure>]) -> Step {
         let windows = self.analysis.windows.len();
         let thresholds = maps.blocks.len() / windows;
@@ -115,7 +115,7 @@ impl Provenance<'_> {
         Step { time: self.map.time.clone(), tables: tables.collect(), attributes, numbers }
     }
 
-    /// Of what a map is, in words: the window, and the threshold if it is of one.
+    /// The window of a map, and its threshold if it is of one, in words.
     fn words(&self, block: &Block, threshold: Option<usize>) -> String {
         let window = match block.window {
             0.0 => "of each pixel".to_owned(),
@@ -143,7 +143,7 @@ impl Provenance<'_> {
         self.map.time.is_some() && self.analysis.threshold_unit == ThresholdUnit::Sigma
     }
 
-    /// What is said of a file as a whole: the entries of the first table, but for what differs between tables or steps.
+    /// The attributes of a file as a whole: the entries of the first table, without those that differ between tables or steps.
     fn attributes(&self, maps: &MinkowskiMaps, sequence: bool) -> Vec<Card> {
         let windows: Vec<_> = self.analysis.windows.iter().map(f64::to_string).collect();
         let mut cards = vec![text("TITLE", format!("Minkowski map of {}", self.map.name), "")];
@@ -208,7 +208,7 @@ impl Provenance<'_> {
     }
 }
 
-/// What is said of the map that a file is made of.
+/// The header entries about the map that a file is made of.
 pub(crate) fn input_cards(path: &Path, map: &Map) -> Vec<Card> {
     let mut cards = vec![creator()];
     // Maps in memory have no file.
@@ -224,7 +224,7 @@ pub(crate) fn input_cards(path: &Path, map: &Map) -> Vec<Card> {
     cards
 }
 
-/// What is said of its mask, if there is one.
+/// The header entries about the mask, if there is one.
 pub(crate) fn mask_cards(input: &Input) -> Vec<Card> {
     let Some(mask) = &input.mask else { return Vec::new() };
     let mut cards = vec![text("MASKFILE", mask.to_string_lossy(), "mask")];

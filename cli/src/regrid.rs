@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     running.say(format_args!("{}: {of}{name} of Nside {nside} {summary} ({seconds:.2} s){note}", shown(output)))
 }
 
-/// What is written of a map.
+/// The step of a file with a map.
 fn of(path: &Path, map: Map, input: &Input) -> Step {
     let mut cards = input_cards(path, &map);
     cards.extend(mask_cards(input));
@@ -102,7 +102,7 @@ fn of(path: &Path, map: Map, input: &Input) -> Step {
     Step { time, tables: vec![table], attributes, numbers: Vec::new() }
 }
 
-/// What maps hold, in a few words.
+/// A summary of maps in a few words.
 #[derive(Default)]
 struct Summary {
     /// Of all maps so far.

@@ -1,6 +1,6 @@
-//! What is said of how a field came to HEALPix: to people, and in headers.
+//! The way in which a field came to HEALPix, as people and headers are told of it.
 //!
-//! Which way is taken is left to [`longan_formats`].
+//! The choice of the way is left to [`longan_grid`].
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -18,7 +18,7 @@ pub(crate) const WAY: &str = "REGRID";
 /// The header entry that says how many sides of a pixel make the spacing.
 pub(crate) const RATIO: &str = "REGRATIO";
 
-/// What headers say of it; nothing of a map that was HEALPix.
+/// The header entries about it; none for a map that was HEALPix.
 pub(crate) fn cards(map: &Map) -> Vec<Card> {
     let Some(regridded) = &map.regridded else { return Vec::new() };
     let mut cards = vec![text(WAY, regridded.way.to_string(), "how the input came to HEALPix")];
@@ -80,12 +80,12 @@ pub(crate) fn warning(path: &Path, map: &Map) -> Option<String> {
     ))
 }
 
-/// What has been said, so that many files do not say the same.
+/// The notes and warnings of a run, so that many files do not repeat the same.
 #[derive(Default)]
-pub(crate) struct Said(Mutex<HashSet<String>>);
+pub(crate) struct Notices(Mutex<HashSet<String>>);
 
-impl Said {
-    /// Says what there is to say of a file's maps on standard error, unless it was said of another file.
+impl Notices {
+    /// Prints note and warning about a file's maps on standard error, unless they were printed for another file.
     pub(crate) fn say(&self, running: &Running, path: &Path, map: &Map) {
         self.say_note(running, path, note(map));
         if let Some(warning) = warning(path, map).filter(|warning| self.is_new(path, warning)) {
@@ -93,14 +93,14 @@ impl Said {
         }
     }
 
-    /// Says a note on standard error, unless it was said of another file.
+    /// Prints a note on standard error, unless it was printed for another file.
     pub(crate) fn say_note(&self, running: &Running, path: &Path, note: Option<String>) {
         if let Some(note) = note.filter(|note| self.is_new(path, note)) {
             running.note(format_args!("{}: {note}", shown(path)));
         }
     }
 
-    /// Whether a sentence, but for the file's name, was not said before.
+    /// Whether a sentence, but for the file's name, was not printed before.
     fn is_new(&self, path: &Path, sentence: &str) -> bool {
         let of_any = sentence.strip_prefix(&shown(path)).unwrap_or(sentence);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(of_any.to_owned())

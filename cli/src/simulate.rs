@@ -142,7 +142,7 @@ impl WavesArguments {
     }
 }
 
-/// What the header of a simulated field says.
+/// The header entries of a simulated field.
 pub(crate) fn waves_cards(waves: &Waves, correlation: f64, seed: u64) -> Vec<Card> {
     vec![
         real("CORRANG", correlation, "[deg] correlation angle"),

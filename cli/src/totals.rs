@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for step in 0..steps {
         let map = series.read(step, mask.as_ref())?;
         if step == 0 {
-            regridding::Said::default().say(&arguments.running, path, &map);
+            regridding::Notices::default().say(&arguments.running, path, &map);
         }
         let time = map.time.as_ref().map(|time| time.label.clone());
         let analysis = arguments.body.analysis();

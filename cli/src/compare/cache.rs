@@ -33,7 +33,7 @@ pub(super) fn minkowski_maps(
     let mapper = mapping.mapper(measures, jobs.memory(), running, true)?;
     let outputs = outputs(folder, inputs)?;
     for path in inputs {
-        if MadeFrom::of(path, mapping.input().hdu, &[]).is_ok_and(|said| said.is_some()) {
+        if MadeFrom::of(path, mapping.input().hdu, &[]).is_ok_and(|made| made.is_some()) {
             bail!("{}: this is a Minkowski map of longan already; compare it without --work", shown(path));
         }
         let steps = mapping.input().open(path)?.steps();
@@ -47,7 +47,7 @@ pub(super) fn minkowski_maps(
     let tasks = tasks(inputs, &outputs, &mapper, running)?;
     let all: Vec<PathBuf> = inputs.iter().map(|input| input.to_path_buf()).collect();
     let progress = Progress::of_parts(tasks.len(), running.quiet || tasks.is_empty());
-    let told = regridding::Said::default();
+    let told = regridding::Notices::default();
     let made = jobs.run(&tasks, |(input, output)| {
         let part = progress.part();
         let made = mapper.map(input, output, true, &command(&all, input), |share| part.set(share))?;
@@ -59,11 +59,11 @@ pub(super) fn minkowski_maps(
     drop(progress);
     // The others are done, and are not done again when this one can be.
     made.into_iter().collect::<anyhow::Result<()>>()?;
-    let said = |output: &PathBuf| {
+    let made_from = |output: &PathBuf| {
         MadeFrom::of(output, None, &[])?
             .with_context(|| format!("{}: this is no Minkowski map of longan; remove it", shown(output)))
     };
-    outputs.iter().map(said).collect()
+    outputs.iter().map(made_from).collect()
 }
 
 /// Where the Minkowski map of each input belongs.

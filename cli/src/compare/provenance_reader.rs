@@ -225,7 +225,7 @@ impl MadeFrom {
             !units_differ(unit, other_unit),
             differ("thresholds in the unit", (path, unit), (other_path, other_unit))
         );
-        let [mine, others] = [self, other].map(|said| (shown(&said.path), said.coordinates));
+        let [mine, others] = [self, other].map(|file| (shown(&file.path), file.coordinates));
         if let Some(mismatch) = of_coordinates((&mine.0, mine.1), (&others.0, others.1)).filter(|_| !ignore_coordsys) {
             bail!(mismatch);
         }
