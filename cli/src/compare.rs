@@ -23,15 +23,16 @@ use longan_formats::{self as formats, Card};
 use longan_grid::Healpix;
 use ndarray::Array1;
 
+use super::cards::{creator, integer, numbered, real, text};
+use super::command_line::command;
 use super::input::Input;
 use super::map_options::Mapping;
 use super::map_writer::{self, Kind, MapColumn, Step, Table};
 use super::mismatch::Together;
-use super::misused;
+use super::misused::misused;
 use super::options::{Format, Running, between, check_apart, check_memory, print, shown, whole};
 use super::parallel::Jobs;
 use super::progress::Progress;
-use super::provenance::{command, creator, integer, numbered, real, text};
 use super::quantity::stated;
 use provenance_reader::{Column, MadeFrom};
 use report::{OfMeasure, Region, Report};
@@ -149,7 +150,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let files = match &arguments.work {
         Some(folder) => {
             let inputs: Vec<&Path> = arguments.inputs().collect();
-            let measures = arguments.mapping.measures("compare")?;
+            let measures = arguments.mapping.measures()?;
             let column =
                 |measure: &Arc<dyn Measure>| Column::to_be(measure.column(), measure.unit(), measure.quantity());
             let columns: Vec<Column> = measures.iter().map(column).collect();
@@ -258,10 +259,10 @@ impl Arguments {
     /// Checks the arguments themselves, before anything is read; the scatter plot asked for.
     fn checked(&self) -> anyhow::Result<Option<Scatter>> {
         if let [only] = &self.simulations[..] {
-            return Err(misused(
-                "compare",
-                format!("'{}' is the only simulation, and a standard deviation needs at least two", shown(only)),
-            ));
+            return Err(misused(format!(
+                "'{}' is the only simulation, and a standard deviation needs at least two",
+                shown(only)
+            )));
         }
         let scatter = match &self.scatter[..] {
             [at, pair] => {
@@ -504,5 +505,5 @@ fn region(outlier: &Outlier) -> Region {
 
 /// A complaint about the value of an option.
 fn wrong(option: &str, value: &str, problem: String) -> anyhow::Error {
-    misused("compare", format!("invalid value '{value}' for '{option} <LON,LAT> <MEASURE,MEASURE>': {problem}"))
+    misused(format!("invalid value '{value}' for '{option} <LON,LAT> <MEASURE,MEASURE>': {problem}"))
 }

@@ -20,13 +20,14 @@ use longan_picture::axes::PALETTE;
 use super::input::{Input, Mask};
 use super::map_options::{find, no_measure};
 use super::mismatch::Together;
+use super::misused::misused;
 use super::options::{
     BodyOptions, ContourOption, Running, WeightOption, between, check_apart, check_memory, nside, shown,
 };
 use super::picture_format::{Form, save};
 use super::plugin::Plugins;
 use super::progress::Progress;
-use super::{mismatch, misused, regridding};
+use super::{mismatch, regridding};
 
 /// Measures of shape against threshold: a picture, and the numbers as CSV beside it.
 ///
@@ -204,13 +205,13 @@ impl Arguments {
         for text in texts {
             let ordinate = match Density::named(text) {
                 Some(density) => Ordinate::Density(density),
-                None => Ordinate::Mean(find(&catalogue, text, "graph")?),
+                None => Ordinate::Mean(find(&catalogue, text)?),
             };
-            graph.add(ordinate).map_err(|problem| no_measure(text, problem, "graph"))?;
+            graph.add(ordinate).map_err(|problem| no_measure(text, problem))?;
         }
         if self.gaussian && graph.ordinates().iter().all(|ordinate| ordinate.measure().is_some()) {
             let problem = "--gaussian is about w0, w1, w2 and euler, and none of these is asked for";
-            return Err(misused("graph", problem.to_owned()));
+            return Err(misused(problem.to_owned()));
         }
         graph.analysis = Analysis {
             windows: vec![self.window],

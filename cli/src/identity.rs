@@ -9,7 +9,7 @@ use longan::Recipe;
 use longan_formats::{Card, CardValue, InputRecord, Role, TableDescription};
 use serde::de::DeserializeOwned;
 
-use super::provenance::text;
+use super::cards::text;
 
 /// The header entry with the recipe, in JSON.
 pub(crate) const RECIPE: &str = "RECIPE";

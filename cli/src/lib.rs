@@ -5,6 +5,8 @@
 //! arguments make no sense. A program stopped by a signal, such as Ctrl-C, ends by that signal and leaves no unfinished
 //! file.
 
+mod cards;
+mod command_line;
 mod compare;
 mod demo;
 mod graph;
@@ -17,6 +19,7 @@ mod map_writer;
 mod measures;
 mod minkowski_file;
 mod mismatch;
+mod misused;
 mod options;
 mod parallel;
 mod picture_format;
@@ -33,11 +36,14 @@ mod totals;
 
 pub use minkowski_file::write_minkowski_maps;
 
+use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use misused::Misused;
 
 /// Shape on the sphere: Minkowski functionals and tensors of maps and other fields, in moving windows.
 ///
@@ -86,11 +92,26 @@ enum Command {
     Demo(demo::Arguments),
 }
 
-/// Runs the program.
+/// Runs the program with the arguments of this process.
 pub fn main() -> ExitCode {
+    run(std::env::args_os().collect()).into()
+}
+
+/// Runs the program, once in a process, with arguments of which the first is its name. The exit status is returned.
+pub fn run(arguments: Vec<OsString>) -> u8 {
     #[cfg(unix)]
     clean_up_when_stopped();
-    let done = match Arguments::parse().command {
+    let mut commands = Arguments::command();
+    let parsed = commands.try_get_matches_from_mut(command_line::keep(arguments));
+    let (command, name) = match parsed.and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?.command, matches)))
+    {
+        Ok((command, matches)) => (command, matches.subcommand_name().unwrap_or_default().to_owned()),
+        Err(e) => {
+            let _ = e.print();
+            return u8::try_from(e.exit_code()).unwrap_or(2);
+        }
+    };
+    let done = match command {
         Command::Map(arguments) => map::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Totals(arguments) => totals::run(&arguments),
@@ -103,27 +124,18 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => match e.downcast::<clap::Error>() {
-            Ok(misused) => {
-                let _ = misused.print();
-                ExitCode::from(2)
-            }
-            Err(e) => {
-                let _ = writeln!(std::io::stderr(), "longan: {}", remedies::told(&e));
-                ExitCode::FAILURE
-            }
-        },
+    match done.map_err(|e| e.downcast::<Misused>()) {
+        Ok(()) => 0,
+        Err(Ok(Misused(problem))) => {
+            let command = commands.find_subcommand_mut(&name).expect("the command that ran");
+            let _ = command.error(ErrorKind::ValueValidation, problem).print();
+            2
+        }
+        Err(Err(e)) => {
+            let _ = writeln!(std::io::stderr(), "longan: {}", remedies::told(&e));
+            1
+        }
     }
-}
-
-/// An error as clap reports those of arguments, for arguments that make no sense together.
-fn misused(command: &str, problem: String) -> anyhow::Error {
-    let mut arguments = Arguments::command();
-    arguments.build();
-    let command = arguments.find_subcommand_mut(command).expect("a command of this program");
-    command.error(ErrorKind::ValueValidation, problem).into()
 }
 
 /// Removes unfinished files when the program is told to end, and then ends it in the way of that signal.

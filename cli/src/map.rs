@@ -12,13 +12,13 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use longan_formats::{self as formats, CardValue, Error, ErrorKind, TableDescription};
 
+use super::command_line::command;
 use super::identity::Identity;
 use super::map_options::{Made, Mapper, Mapping};
 use super::map_writer::Kind;
 use super::options::{Running, check_apart, shown};
 use super::parallel::Jobs;
 use super::progress::{Progress, rate};
-use super::provenance::command;
 use super::remedies::told;
 
 /// Minkowski map of a field on the sphere: measures of shape in windows about the pixels of a coarser grid.
@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.running.start()?;
-    let measures = arguments.mapping.measures("map")?;
+    let measures = arguments.mapping.measures()?;
     let mapping = &arguments.mapping;
     mapping.input().check_units(&arguments.inputs, mapping.analysis().threshold_unit)?;
     let tasks = arguments.tasks()?;

@@ -20,6 +20,8 @@ use longan_grid::{Healpix, Map};
 use super::identity::Identity;
 use super::input::{Input, Mask, Series};
 use super::map_writer::{self, Kind, LayoutOptions};
+use super::mismatch;
+use super::misused::misused;
 use super::options::{
     BodyOptions, ContourOption, Running, WeightOption, between, check_memory, decimals, nside, shown,
 };
@@ -28,7 +30,6 @@ use super::plugin::Plugins;
 use super::provenance::Provenance;
 use super::regridding;
 use super::remedies::of_mask;
-use super::{mismatch, misused};
 
 /// The field that is measured, the analysis, and the layout of the result.
 #[derive(Args, Clone, Debug, PartialEq)]
@@ -130,23 +131,23 @@ impl Mapping {
         self.input.mask.as_deref()
     }
 
-    /// The measures asked for, no two the same. `command` is whose arguments these are.
-    pub(crate) fn measures(&self, command: &str) -> anyhow::Result<Vec<Arc<dyn Measure>>> {
+    /// The measures asked for, no two the same.
+    pub(crate) fn measures(&self) -> anyhow::Result<Vec<Arc<dyn Measure>>> {
         let catalogue = self.plugins.catalogue()?;
         let mut measures: Vec<Arc<dyn Measure>> = Vec::new();
         for text in self.names() {
-            let measure = find(&catalogue, text, command)?;
+            let measure = find(&catalogue, text)?;
             if let Some(other) = measures.iter().find(|other| other.column().eq_ignore_ascii_case(&measure.column())) {
                 let [one, other] = [measure.name(), other.name()];
                 let twice = if one == other { "is given twice".into() } else { format!("has the column of '{other}'") };
-                return Err(no_measure(text, format!("'{one}' {twice}"), command));
+                return Err(no_measure(text, format!("'{one}' {twice}")));
             }
             measures.push(measure);
         }
         if measures.len() > COLUMNS_MAX {
             let problem =
                 format!("{} measures are more than the {COLUMNS_MAX} columns of a FITS table", measures.len());
-            return Err(misused(command, problem));
+            return Err(misused(problem));
         }
         if measures.is_empty() {
             measures.push(catalogue.find(&format!("longan:{DEFAULT}"))?);
@@ -170,17 +171,17 @@ impl Mapping {
 }
 
 /// The measure of a name or formula.
-pub(crate) fn find(catalogue: &Catalogue, text: &str, command: &str) -> anyhow::Result<Arc<dyn Measure>> {
+pub(crate) fn find(catalogue: &Catalogue, text: &str) -> anyhow::Result<Arc<dyn Measure>> {
     catalogue.find(text).map_err(|e| match &e {
-        CatalogueError::Formula(formula) => no_measure(text, format!("{e}\n\n{}", formula.marked()), command),
-        CatalogueError::Unknown(_) => no_measure(text, format!("{e}; `longan measures` lists them all"), command),
-        _ => no_measure(text, e.to_string(), command),
+        CatalogueError::Formula(formula) => no_measure(text, format!("{e}\n\n{}", formula.marked())),
+        CatalogueError::Unknown(_) => no_measure(text, format!("{e}; `longan measures` lists them all")),
+        _ => no_measure(text, e.to_string()),
     })
 }
 
 /// The complaint about a text that names no measure that can be taken.
-pub(crate) fn no_measure(text: &str, problem: impl fmt::Display, command: &str) -> anyhow::Error {
-    misused(command, format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
+pub(crate) fn no_measure(text: &str, problem: impl fmt::Display) -> anyhow::Error {
+    misused(format!("invalid value '{text}' for '--measure <LIST>': {problem}"))
 }
 
 /// A computation that is ready for files; several threads may share it.

@@ -12,8 +12,8 @@ use longan_formats::{
 };
 use longan_grid::{CoordinateSystem, Healpix, Map, Ordering, Time};
 
+use super::cards::text;
 use super::options::shown;
-use super::provenance::text;
 
 /// How maps are laid out in files.
 #[derive(Args, Clone, Debug, Default, PartialEq)]

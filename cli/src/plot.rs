@@ -20,7 +20,7 @@ use longan_picture::{
 
 use super::input::{Input, Mask, field, place};
 use super::mismatch::of_coordinates;
-use super::misused;
+use super::misused::misused;
 use super::options::{Running, check_apart, finite, shown};
 use super::picture_format::{Form, save};
 use super::quantity::{meaning, of_column};
@@ -204,7 +204,7 @@ impl Arguments {
     fn projection(&self) -> anyhow::Result<Arc<dyn Projection>> {
         let is_gnomonic = self.projection == ProjectionOption::Gnomonic;
         if self.size.is_some() && !is_gnomonic {
-            return Err(misused("plot", "--size is of a gnomonic picture; add --projection gnomonic".to_owned()));
+            return Err(misused("--size is of a gnomonic picture; add --projection gnomonic".to_owned()));
         }
         Ok(match self.projection {
             ProjectionOption::Mollweide => Arc::new(Mollweide),
@@ -216,10 +216,7 @@ impl Arguments {
                 let sizes = projection::GNOMONIC_SIZES;
                 let wrong = |_| {
                     let (least, most) = (sizes.start(), sizes.end());
-                    misused(
-                        "plot",
-                        format!("invalid value '{size}' for '--size <DEG>': not between {least} and {most}"),
-                    )
+                    misused(format!("invalid value '{size}' for '--size <DEG>': not between {least} and {most}"))
                 };
                 Arc::new(Gnomonic::new(size).map_err(wrong)?)
             }

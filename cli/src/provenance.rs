@@ -1,14 +1,14 @@
 //! Minkowski maps as they are written: columns, and in headers and attributes what was done.
 
-use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use longan::measures::{Measure, Origin};
 use longan::statistics::Statistics;
 use longan::{Analysis, Block, MinkowskiMaps, ThresholdUnit};
-use longan_formats::{Card, CardValue, NetcdfColumn};
+use longan_formats::{Card, NetcdfColumn};
 use longan_grid::Map;
 
+use super::cards::{creator, integer, numbered, real, text};
 use super::identity::Identity;
 use super::input::Input;
 use super::map_writer::{MapColumn, Step, Table};
@@ -31,31 +31,6 @@ pub(crate) struct Provenance<'a> {
     pub(crate) command: String,
 }
 
-/// A header entry.
-pub(crate) fn card(key: &str, value: CardValue, comment: &str) -> Card {
-    Card { key: key.to_owned(), value, comment: comment.to_owned() }
-}
-
-/// A text entry.
-pub(crate) fn text(key: &str, value: impl Into<String>, comment: &str) -> Card {
-    card(key, CardValue::Text(value.into()), comment)
-}
-
-/// A real entry.
-pub(crate) fn real(key: &str, value: f64, comment: &str) -> Card {
-    card(key, CardValue::Real(value), comment)
-}
-
-/// An integer entry.
-pub(crate) fn integer(key: &str, value: usize, comment: &str) -> Card {
-    card(key, CardValue::Integer(value as i64), comment)
-}
-
-/// Name and version of this program.
-pub(crate) fn creator() -> Card {
-    text("CREATOR", concat!("longan ", env!("CARGO_PKG_VERSION")), "program that wrote this file")
-}
-
 /// Formulas and plugins that measures come from.
 fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
     let (mut formulas, mut plugins) = (Vec::new(), Vec::new());
@@ -70,13 +45,6 @@ fn origins(measures: &[impl AsRef<dyn Measure>]) -> Vec<Card> {
         (1..).zip(formulas).map(|(n, text)| self::text(&numbered("FORMULA", n), text, "formula of a column"));
     let plugins = (1..).zip(plugins).map(|(n, text)| self::text(&numbered("PLUGIN", n), text, "plugin of measures"));
     formulas.chain(plugins).collect()
-}
-
-/// A keyword with a number, within the eight characters of FITS: FORMULA1 to FORMULA9, FORMUL10 and so on.
-pub(crate) fn numbered(keyword: &str, number: usize) -> String {
-    let number = number.to_string();
-    let room = 8usize.saturating_sub(number.len()).min(keyword.len());
-    format!("{}{number}", &keyword[..room])
 }
 
 impl Provenance<'_> {
@@ -233,53 +201,4 @@ pub(crate) fn mask_cards(input: &Input) -> Vec<Card> {
     }
     cards.push(real("MASKTHR", input.mask_threshold, "masked below this mask value"));
     cards
-}
-
-/// Options that say how a program runs, and nothing about what it makes.
-const RUNNING: [&str; 4] = ["--resume", "--overwrite", "--quiet", "--verbose"];
-
-/// Those of them that have a value.
-const RUNNING_WITH_VALUE: [&str; 4] = ["--jobs", "--memory", "--shard", "--threads"];
-
-/// Those of them that are letters, which may stand before another.
-const RUNNING_LETTERS: [char; 2] = ['q', 'v'];
-
-/// The command that makes an output of this input: as given, without the other inputs and without options that do not
-/// matter to what is made.
-pub(crate) fn command(inputs: &[PathBuf], input: &Path) -> String {
-    let others: HashSet<_> = inputs.iter().filter(|i| *i != input).map(|i| i.as_os_str()).collect();
-    let mut arguments = std::env::args_os().skip(1);
-    let mut words: Vec<String> = Vec::new();
-    let mut only_inputs = false;
-    while let Some(argument) = arguments.next() {
-        let mut word = argument.to_string_lossy().into_owned();
-        // A mask may be an input too.
-        let is_mask = words.last().is_some_and(|last| ["-m", "--mask"].contains(&last.as_str()));
-        if others.contains(argument.as_os_str()) && !is_mask {
-            continue;
-        }
-        only_inputs |= word == "--";
-        if !only_inputs {
-            let name = word.split_once('=').map_or(word.as_str(), |(name, _)| name);
-            if RUNNING.contains(&name) {
-                continue;
-            }
-            if RUNNING_WITH_VALUE.contains(&name) {
-                if name == word {
-                    arguments.next();
-                }
-                continue;
-            }
-            if let Some(letters) = word.strip_prefix('-').filter(|letters| letters.starts_with(RUNNING_LETTERS)) {
-                let rest = letters.trim_start_matches(RUNNING_LETTERS);
-                if rest.is_empty() {
-                    continue;
-                }
-                word = format!("-{rest}");
-            }
-        }
-        words.push(word);
-    }
-    let quoted = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_else(|_| words.join(" "));
-    format!("longan {quoted}")
 }

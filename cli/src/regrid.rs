@@ -10,11 +10,13 @@ use longan::statistics::{Statistics, statistics};
 use longan_formats as formats;
 use longan_grid::Map;
 
+use super::cards::text;
+use super::command_line::command;
 use super::input::Input;
 use super::map_writer::{self, Kind, LayoutOptions, MapColumn, Step, Table};
 use super::options::{Running, check_apart, decimals, shown};
 use super::progress::Progress;
-use super::provenance::{command, input_cards, mask_cards, text};
+use super::provenance::{input_cards, mask_cards};
 use super::regridding;
 
 /// The map of a file as HEALPix, whatever it was, with nothing measured.

@@ -9,8 +9,8 @@ use std::sync::{Mutex, PoisonError};
 use longan_formats::Card;
 use longan_grid::{Gather, Map, Method, Regridded, Way};
 
+use super::cards::{real, text};
 use super::options::{Running, shown};
-use super::provenance::{real, text};
 
 /// The header entry that names the way.
 pub(crate) const WAY: &str = "REGRID";

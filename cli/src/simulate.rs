@@ -8,9 +8,9 @@ use longan::simulate::{Body, Edge, Shape, Waves, scene, shapes};
 use longan_formats::{self as formats, Card};
 use longan_grid::{Healpix, Map, Ordering};
 
+use super::cards::{creator, integer, real, text};
 use super::map_writer::{self, Kind, Layout, MapColumn, Step, Table};
 use super::options::{Running, acute, between, check_memory, finite, nside, shown, whole};
-use super::provenance::{creator, integer, real, text};
 
 /// A map whose shape is known: bodies of simple outline, or a Gaussian random field.
 #[derive(Args, Debug)]

@@ -11,13 +11,13 @@ use anyhow::{Context, bail, ensure};
 use longan::measures::Measure;
 use longan_formats as formats;
 
+use super::super::command_line::command;
 use super::super::identity::{Difference, Identity};
 use super::super::map_options::{Mapper, Mapping};
 use super::super::map_writer::Kind;
 use super::super::options::{Running, is_same_file, shown};
 use super::super::parallel::Jobs;
 use super::super::progress::Progress;
-use super::super::provenance::command;
 use super::super::regridding;
 use super::provenance_reader::{MadeFrom, is_minkowski};
 

@@ -13,10 +13,10 @@ use longan_formats::{
 };
 use longan_grid::{CoordinateSystem, Map};
 
+use super::super::cards::{card, integer, numbered, real};
 use super::super::identity::{INPUTS, Identity, RECIPE};
 use super::super::mismatch::of_coordinates;
 use super::super::options::{is_same_file, shown};
-use super::super::provenance::{card, integer, numbered, real};
 use super::super::quantity::of_measure;
 use super::super::regridding;
 
