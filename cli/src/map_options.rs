@@ -384,10 +384,13 @@ impl Summary {
             if values.is_empty() {
                 continue;
             }
-            values.sort_by(f64::total_cmp);
             let n = values.len();
-            self.range = widened(widened(self.range, values[0]), values[n - 1]);
-            self.medians = widened(self.medians, 0.5 * (values[(n - 1) / 2] + values[n / 2]));
+            let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
+            // Of an even number of values the middle ones are two.
+            let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let median = if n % 2 == 0 { 0.5 * (lower + upper) } else { upper };
+            self.range = values.iter().fold(self.range, |range, &value| widened(range, value));
+            self.medians = widened(self.medians, median);
         }
     }
 
