@@ -388,7 +388,7 @@ impl Summary {
             let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
             // Of an even number of values the middle ones are two.
             let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let median = if n % 2 == 0 { 0.5 * (lower + upper) } else { upper };
+            let median = if n.is_multiple_of(2) { 0.5 * (lower + upper) } else { upper };
             self.range = values.iter().fold(self.range, |range, &value| widened(range, value));
             self.medians = widened(self.medians, median);
         }
